@@ -1,0 +1,148 @@
+"""The files around the code say what is true: environment, lock, map, reference, imports."""
+
+import ast
+import json
+import re
+import subprocess
+import tomllib
+from itertools import chain
+from pathlib import Path
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
+
+import motionlab
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "motionlab"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+# The line of CONTRIBUTING.md: a module may import from its own group and from those before it.
+GROUPS = [
+    {group.strip().rstrip("/") for group in part.split(",")}
+    for part in re.search(r"\n    (skeleton.*?)\n\n", CONTRIBUTING, re.DOTALL)[1].split("<-")
+]
+
+
+def tracked(*under: str) -> list[Path]:
+    """Files that git keeps or would keep: not what .gitignore names."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", *under],
+        cwd=ROOT, capture_output=True, text=True, encoding="utf-8",
+    )  # fmt: skip
+    if listed.returncode:
+        pytest.skip("not a git checkout")
+    return [ROOT / line for line in listed.stdout.splitlines() if (ROOT / line).exists()]
+
+
+def test_environment_installs_the_lock_and_every_extra():
+    environment = yaml.safe_load((ROOT / "environment.yml").read_text(encoding="utf-8"))
+    *conda, pip = environment["dependencies"]
+    python = next(d for d in conda if d.startswith("python=")).removeprefix("python=")
+    assert SpecifierSet(PROJECT["requires-python"]).contains(python)
+    assert "-r requirements-lock.txt" in pip["pip"]
+    editable = next(line for line in pip["pip"] if line.startswith("-e "))
+    assert set(Requirement("motionlab" + editable[4:]).extras) == set(
+        PROJECT["optional-dependencies"]
+    )
+
+
+def test_lock_pins_every_dependency_inside_its_range():
+    lines = (ROOT / "requirements-lock.txt").read_text(encoding="utf-8").splitlines()
+    lock = [Requirement(line) for line in lines if line and not line.startswith("#")]
+    wanted = list(chain(PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()))
+    for requirement in map(Requirement, wanted):
+        name = canonicalize_name(requirement.name)
+        pins = [r for r in lock if canonicalize_name(r.name) == name]
+        assert pins, f"{name} is not in the lock file"
+        for pin in pins:
+            version = str(pin.specifier).removeprefix("==")
+            assert requirement.specifier.contains(version), f"{requirement}, locked {version}"
+    assert "torch==2.13.0" in lines
+    assert not any("://" in line for line in lines if not line.startswith("#"))
+
+
+def test_version_is_the_same_everywhere():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert PROJECT["version"] == motionlab.__version__ == citation["version"]
+    assert PROJECT["license"] == citation["license"] == "MIT"
+
+
+def test_map_in_contributing_is_the_tree():
+    block = re.search(r"```text\n.*?```", CONTRIBUTING, re.DOTALL)[0]
+    named = set(re.findall(r"^([a-z]+)/", block, re.MULTILINE))
+    inner = set(re.findall(r"^  ([a-z]+)/", block, re.MULTILINE))
+    folders = {p.relative_to(ROOT).parts for p in tracked()}
+    assert named == {f[0] for f in folders if len(f) > 1 and not f[0].startswith(".")}
+    assert inner == {f[2] for f in folders if f[:2] == ("src", "motionlab") and len(f) > 3}
+
+
+def group_of(module: str) -> int | None:
+    """Which group of the line a dotted module (without `motionlab.`) belongs to."""
+    return next((i for i, names in enumerate(GROUPS) if module.split(".")[0] in names), None)
+
+
+def imports_of(path: Path) -> set[str]:
+    """Modules of motionlab that a file imports when it is loaded, dotted, without `motionlab.`"""
+    package = ["motionlab", *path.relative_to(PACKAGE).parent.parts]
+    found = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            found |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
+    return {m.removeprefix("motionlab.") for m in found if m.startswith("motionlab.")}
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.stem)
+def test_imports_point_left(path):
+    own = group_of(".".join(path.relative_to(PACKAGE).with_suffix("").parts))
+    if own is None:  # __init__, __main__, errors: outside the line
+        return
+    for module in imports_of(path):
+        theirs = group_of(module)
+        assert theirs is None or theirs <= own, f"{path.name} imports motionlab.{module}"
+
+
+def public_modules() -> set[str]:
+    modules = {p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py")}
+    return {".".join(m.parts) for m in modules if not m.name.startswith("_")}
+
+
+def test_reference_names_every_public_module():
+    text = (ROOT / "book" / "api.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"auto\w+:: motionlab\.(\S+)", text))
+    internal = set(re.search(r"% inner modules, not for readers: (.*)", text)[1].split())
+    missing = {m for m in public_modules() - internal if m not in named}
+    missing = {m for m in missing if not any(n.startswith(m + ".") for n in named)}
+    assert not missing, f"book/api.md has no section for {sorted(missing)}"
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem)
+def test_notebook_is_stored_without_outputs(path):
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    assert not [c for c in cells if c.get("outputs") or c.get("execution_count")]
+    for cell in cells:
+        assert "".join(cell["source"]).count("\n") < 25 or cell["cell_type"] != "code"
+
+
+def test_every_chapter_is_in_the_table_of_contents():
+    toc = (ROOT / "book" / "_toc.yml").read_text(encoding="utf-8")
+    for path in (ROOT / "notebooks").glob("*.ipynb"):
+        assert f"notebooks/{path.stem}" in toc
+
+
+def test_files_are_small_and_nothing_large_is_kept():
+    files = tracked()
+    assert sum(p.stat().st_size for p in files) < 46 * 2**20
+    for path in files:
+        if path.suffix in {".py", ".js", ".ts"}:
+            lines = path.read_text(encoding="utf-8").count("\n")
+            assert lines <= 400, f"{path.name} has {lines} lines"
+    assert not [p for p in files if p.suffix in {".bvh", ".zip", ".ckpt"}]
