@@ -1,0 +1,35 @@
+"""motionlab: recurrent human motion synthesis, rebuilt on real motion capture."""
+
+from .errors import MotionLabError
+from .io.bvh import read_bvh, write_bvh
+from .kinematics import forward_kinematics
+from .motion import Motion, concatenate
+from .skeleton import Skeleton
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Motion",
+    "MotionLabError",
+    "Skeleton",
+    "concatenate",
+    "datasets",
+    "forward_kinematics",
+    "read_bvh",
+    "show",
+    "viewer",
+    "write_bvh",
+]
+
+
+def __getattr__(name: str):
+    # Data sets and pictures are imported when first used: reading a clip needs neither.
+    if name in ("datasets", "viewer"):
+        import importlib
+
+        return importlib.import_module(f".{name}", __name__)
+    if name == "show":
+        from .viewer import show
+
+        return show
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

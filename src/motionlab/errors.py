@@ -1,0 +1,25 @@
+"""Errors a person can act on: each says what is wrong, where, and what to do."""
+
+
+class MotionLabError(Exception):
+    """Base of every error that motionlab raises on purpose."""
+
+
+class BvhError(MotionLabError):
+    """A BVH file that can't be read or written; the message names file, line and remedy."""
+
+
+class SkeletonError(MotionLabError):
+    """A skeleton that is not a tree of joints, or that lacks what was asked of it."""
+
+
+class MotionError(MotionLabError):
+    """Arrays that do not make a motion, or motions that do not fit together."""
+
+
+class DataError(MotionLabError):
+    """A data set, clip or cache that is missing, damaged or unknown."""
+
+
+class ViewerError(MotionLabError):
+    """Something that can't be drawn."""

@@ -1,0 +1,103 @@
+"""Forward kinematics, held against plain loops in numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from motionlab.kinematics import forward_kinematics
+
+
+def random_body(seed: int, batch: tuple[int, ...], joints: int, ends: int = 2):
+    rng = np.random.default_rng(seed)
+    parents = [-1] + [int(rng.integers(0, j)) for j in range(1, joints)]
+    count = int(np.prod(batch)) * joints
+    rotations = Rotation.random(count, rng=rng).as_matrix() if count else np.zeros((0, 3, 3))
+    return dict(
+        parents=parents,
+        offsets=torch.tensor(rng.normal(size=(joints, 3))),
+        root_positions=torch.tensor(rng.normal(size=(*batch, 3))),
+        rotations=torch.tensor(rotations.reshape(*batch, joints, 3, 3)),
+        end_parents=rng.integers(0, joints, ends).tolist(),
+        end_offsets=torch.tensor(rng.normal(size=(ends, 3))),
+    )  # fmt: skip
+
+
+def by_loops(parents, offsets, root_positions, rotations, end_parents, end_offsets):
+    """One frame: joint by joint, homogeneous 4 x 4 matrices."""
+    world = []
+    for joint, parent in enumerate(parents):
+        local = np.eye(4)
+        local[:3, :3] = rotations[joint]
+        local[:3, 3] = root_positions if parent < 0 else offsets[joint]
+        world.append(local if parent < 0 else world[parent] @ local)
+    tips = [
+        (world[parent] @ np.append(offset, 1))[:3]
+        for parent, offset in zip(end_parents, end_offsets, strict=True)
+    ]
+    return np.array([w[:3, 3] for w in world] + tips), np.array([w[:3, :3] for w in world])
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    seed=st.integers(0, 2**32),
+    batch=st.sampled_from([(), (1,), (4,), (2, 3)]),
+    joints=st.integers(1, 12),
+    ends=st.integers(0, 3),
+)
+def test_every_frame_as_by_loops(seed, batch, joints, ends):
+    body = random_body(seed, batch, joints, ends)
+    positions, orientations = forward_kinematics(**body)
+    assert positions.shape == (*batch, joints + ends, 3)
+    assert orientations.shape == (*batch, joints, 3, 3)
+    for frame in np.ndindex(*batch):
+        one = {name: np.asarray(value) for name, value in body.items()}
+        one["root_positions"] = one["root_positions"][frame]
+        one["rotations"] = one["rotations"][frame]
+        expected = by_loops(**one)
+        np.testing.assert_allclose(positions[frame].numpy(), expected[0], atol=1e-12)
+        np.testing.assert_allclose(orientations[frame].numpy(), expected[1], atol=1e-12)
+
+
+def test_float32_is_good_to_a_micrometre():
+    body = random_body(0, (200,), 40)
+    single = {k: v.float() if isinstance(v, torch.Tensor) else v for k, v in body.items()}
+    exact, rounded = forward_kinematics(**body)[0], forward_kinematics(**single)[0]
+    assert rounded.dtype == torch.float32
+    assert (exact - rounded).abs().max() < 1e-5  # on a body of some ten metres
+
+
+def test_gradients():
+    body = random_body(1, (2,), 5)
+    variables = ("offsets", "root_positions", "rotations", "end_offsets")
+
+    def positions_and_orientations(*values):
+        return forward_kinematics(**{**body, **dict(zip(variables, values, strict=True))})
+
+    values = [body[name].requires_grad_() for name in variables]
+    assert torch.autograd.gradcheck(positions_and_orientations, values)
+
+
+@pytest.mark.parametrize("batch", [(0,), (3, 0), (0, 2)])
+def test_no_frames(batch):
+    positions, orientations = forward_kinematics(**random_body(2, batch, 4))
+    assert positions.shape == (*batch, 6, 3) and orientations.shape == (*batch, 4, 3, 3)
+
+
+def test_a_body_without_end_sites():
+    body = random_body(3, (2,), 4, ends=0)
+    del body["end_parents"], body["end_offsets"]
+    assert forward_kinematics(**body)[0].shape == (2, 4, 3)
+
+
+def test_inputs_are_left_alone():
+    body = random_body(4, (3,), 5)
+    before = {name: torch.as_tensor(value).clone() for name, value in body.items()}
+    positions, orientations = forward_kinematics(**body)
+    positions.zero_(), orientations.zero_()
+    for name, value in body.items():
+        assert torch.equal(torch.as_tensor(value), before[name]), name
