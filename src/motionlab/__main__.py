@@ -1,0 +1,168 @@
+"""python -m motionlab ...: the command line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
+
+from .errors import MotionLabError
+
+NO_FILES = "gaits are made on the spot and have no files."
+
+
+@dataclass
+class List:
+    """Data sets with size, licence, and whether they are at hand."""
+
+    def run(self) -> None:
+        from .datasets import files, info, names, registry
+
+        print(f"{'name':18} {'clips':>5} {'minutes':>7} {'MB':>6}  {'at hand':9} licence")
+        for name in names():
+            about = info(name)
+            if name == registry.GAITS:
+                here = "always"
+            else:
+                clips = registry.members(name)
+                count = len(clips) - len(files.missing(clips))
+                here = "yes" if count == len(clips) else f"{count}/{len(clips)}" if count else "no"
+            licence = "as the sources" if name == registry.EXAMPLES else about.licence
+            print(
+                f"{name:18} {about.clips:5} {about.minutes:7.1f} {about.bytes / 1e6:6.1f}  "
+                f"{here:9} {licence}"
+            )
+        print(f"\nfiles are kept in {files.cache_folder()}")
+        print(f"MOTIONLAB_DATA: {files.data_folder() or 'not set'}")
+
+
+@dataclass
+class Fetch:
+    """Download a data set's files; shows size and licence first."""
+
+    name: Positional[Annotated[str, arg(metavar="NAME")]]
+    """Data set, as `data list` names it."""
+    yes: bool = False
+    """Download without asking."""
+
+    def run(self) -> None:
+        from .datasets import files, info, registry
+
+        if self.name == registry.GAITS:
+            print(NO_FILES)
+            return
+        clips = registry.members(self.name)
+        damaged = {clip for clip, fault in files.verify(clips) if fault}
+        absent = files.missing(clips) + [clip for clip in clips if clip in damaged]
+        if not absent:
+            print(f"{self.name}: all {len(clips)} clips are at hand.")
+            return
+        print(info(self.name))
+        print(
+            f"\n{len(absent)} of {len(clips)} clips, {sum(c.bytes for c in absent) / 1e6:.1f} MB, "
+            f"to {files.cache_folder()}"
+        )
+        if not self.yes and not _confirmed():
+            raise MotionLabError("Nothing was downloaded; confirm with y, or pass --yes.")
+        files.fetch(absent, self.name)
+        print(f"{self.name}: {len(absent)} clips downloaded and checked.")
+
+
+@dataclass
+class Verify:
+    """Check every file against its SHA-256."""
+
+    name: Positional[Annotated[str | None, arg(metavar="[NAME]")]] = None
+    """Data set; all of them if left out."""
+
+    def run(self) -> None:
+        from tqdm import tqdm
+
+        from .datasets import files, registry
+
+        if self.name == registry.GAITS:
+            print(NO_FILES)
+            return
+        clips = registry.members(self.name) if self.name else list(registry.clips())
+        bar = tqdm(total=len(clips), desc="checking", unit="clip", leave=False, delay=1)
+        found = []
+        with bar:
+            for _, fault in files.verify(clips):
+                found.append(fault)
+                bar.update()
+        bad = [fault for fault in found if fault]
+        what = self.name or "all data sets"
+        print(
+            f"{what}: {len(found) - len(bad)} of {len(clips)} clips right, {len(bad)} wrong, "
+            f"{len(clips) - len(found)} absent"
+        )
+        if bad:
+            raise MotionLabError("\n".join(bad))
+
+
+@dataclass
+class Data:
+    """Named data sets: list, fetch, verify."""
+
+    command: (
+        Annotated[List, subcommand("list")]
+        | Annotated[Fetch, subcommand("fetch")]
+        | Annotated[Verify, subcommand("verify")]
+    )
+
+    def run(self) -> None:
+        self.command.run()
+
+
+@dataclass
+class Version:
+    """Versions of motionlab and of what it stands on, for a report of a fault."""
+
+    def run(self) -> None:
+        import platform
+
+        import torch
+
+        from . import __version__
+
+        print(f"motionlab {__version__}, torch {torch.__version__}, Python {sys.version.split()[0]}, "
+              f"{platform.platform()}")  # fmt: skip
+
+
+COMMANDS = Annotated[Data, subcommand("data")] | Annotated[Version, subcommand("version")]
+
+
+def _confirmed() -> bool:
+    if not sys.stdin.isatty():
+        return False
+    return input("Download? [y/N] ").strip().lower() in ("y", "yes")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; 0 if it went well, 1 if not, 2 for a command line that makes no sense."""
+    # Windows consoles may not know every character of a path or an author's name.
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    command = tyro.cli(
+        OmitSubcommandPrefixes[COMMANDS],
+        prog="motionlab",
+        args=arguments,
+        description="Motion data and models.",
+    )
+    try:
+        command.run()
+    except MotionLabError as error:
+        print(f"motionlab: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

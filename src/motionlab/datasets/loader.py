@@ -1,0 +1,181 @@
+"""Clips by the name of their data set, or from a folder of one's own."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+from tqdm.auto import tqdm
+
+from ..errors import BvhError, DataError
+from ..io.bvh import parse_bvh, read_bvh
+from ..motion import Motion
+from . import cache, files
+from .registry import EXAMPLES, GAITS, Clip, check_name, check_split, check_wanted, choose, sources
+from .splits import assign
+
+
+@contextmanager
+def _one_thread():
+    """Let torch use one thread: a clip is too small to share, and threads that wait for each other
+    cost several times more than they do."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+@_one_thread()
+def load(
+    name: str,
+    split: str | None = None,
+    *,
+    clips: Sequence[str] | None = None,
+    download: bool | None = None,
+) -> list[Motion]:
+    """Clips of a named data set.
+
+    Parameters
+    ----------
+    name : one of `names()`. "gaits" is made on the spot and needs neither files nor network.
+    split : "train", "val" or "test"; None for all.
+    clips : names of the clips wanted, as `table(name)` lists them; None for all.
+    download : None downloads what is missing if it is at most 10 MB, True any size, False nothing.
+
+    Files are looked for in the folder that the environment variable MOTIONLAB_DATA names, then in
+    the user's cache folder. Parsed clips are cached, so that the next load is fast.
+
+    Returns
+    -------
+    list of Motion, by path (examples: as listed). `motion.source` names the source.
+
+    Raises
+    ------
+    DataError : unknown name, split or clip; files that are missing or damaged.
+    """
+    check_name(name)
+    if name == GAITS:
+        return _gaits(split, clips)
+    wanted = choose(name, split, clips)
+    files.data_folder()  # complain of a wrong MOTIONLAB_DATA even if nothing is read from it
+    motions: dict[Clip, Motion] = {}
+    to_parse: dict[str, list[Clip]] = {}
+    for label, members in _cached_together(name).items():
+        some = set(wanted).intersection(members)
+        cached = cache.read(label, members) if some else None
+        if cached is not None:
+            motions.update(zip(members, cached, strict=True))
+        elif some:
+            to_parse[label] = [clip for clip in members if clip in some]
+    files.get(name, [clip for some in to_parse.values() for clip in some], download)
+    with _progress(f"reading {name}", sum(map(len, to_parse.values()))) as bar:
+        for label, some in to_parse.items():
+            arrays = cache.pack([_parse(clip, data, bar) for clip, data in files.read(some)])
+            if some == _cached_together(name)[label]:
+                cache.write(label, some, arrays)
+            names = [(clip.source, clip.name) for clip in some]
+            motions.update(zip(some, cache.unpack(arrays, names), strict=True))
+    return [motions[clip] for clip in wanted]
+
+
+def _cached_together(name: str) -> dict[str, list[Clip]]:
+    """The clips of a data set by the cache file that they are in: one a split, for speed."""
+    groups: dict[str, list[Clip]] = {}
+    for clip in choose(name):
+        groups.setdefault(name if name == EXAMPLES else f"{name}-{clip.split}", []).append(clip)
+    return groups
+
+
+def _parse(clip: Clip, data: bytes, bar) -> Motion:
+    motion = parse_bvh(
+        data, clip.path, units=sources()[clip.source].units, fps=clip.fps, source=clip.source
+    )
+    bar.update()
+    return replace(motion[clip.skip :], name=clip.name)
+
+
+def _gaits(split: str | None, clips: Sequence[str] | None) -> list[Motion]:
+    from . import gaits
+
+    check_split(split)
+    motions = gaits.load(split)
+    if clips is None:
+        return motions
+    check_wanted(clips, [motion.name for motion in gaits.load()], GAITS)
+    return [motion for motion in motions if motion.name in clips]
+
+
+@_one_thread()
+def from_folder(
+    path: str | os.PathLike,
+    *,
+    units: str | float = "cm",
+    fps: float | None = None,
+    pattern: str = "**/*.[bB][vV][hH]",
+    tpose_first: bool = False,
+    drop_zeros: bool = False,
+    split: str | None = None,
+    skip_bad: bool = False,
+) -> list[Motion]:
+    """All BVH files of a folder and its subfolders: a reader's own clips.
+
+    Parameters
+    ----------
+    path : the folder.
+    units, fps, tpose_first, drop_zeros : as for `motionlab.read_bvh`, for all files alike.
+    pattern : which files, as for `pathlib.Path.glob`.
+    split : only the files of this split; which are in it depends on the files' names alone.
+    skip_bad : leave out files that can't be read, with a warning, instead of raising.
+
+    Returns
+    -------
+    list of Motion, by path, named by it without .bvh; `motion.source` is the folder's name.
+
+    Raises
+    ------
+    DataError : there is no such folder or no such file in it, or files that can't be read; the
+        message names all of them.
+    """
+    folder = Path(path).expanduser()
+    check_split(split)
+    if not folder.is_dir():
+        raise DataError(f"{folder}: is not a folder; give the folder that holds the BVH files.")
+    found = sorted(file for file in folder.glob(pattern) if file.is_file())
+    if not found:
+        raise DataError(
+            f"{folder}: no file matches {pattern!r}; put BVH files there, or give another pattern."
+        )
+    names = [file.relative_to(folder).with_suffix("").as_posix() for file in found]
+    splits = assign([("", name, "", "") for name in names])
+    chosen = [row for row in zip(found, names, splits, strict=True) if split in (None, row[2])]
+    motions, bad = [], []
+    with _progress(f"reading {folder.name}", len(chosen)) as bar:
+        for file, name, _ in chosen:
+            try:
+                motion = read_bvh(
+                    file, units=units, fps=fps, tpose_first=tpose_first, drop_zeros=drop_zeros,
+                    source=folder.resolve().name,
+                )  # fmt: skip
+                motions.append(replace(motion, name=name))
+            except BvhError as error:
+                bad.append(str(error))
+            bar.update()
+    if bad:
+        message = f"{folder}: {len(bad)} of {len(chosen)} files can't be read:\n  " + "\n  ".join(
+            bad
+        )
+        if not skip_bad:
+            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True.")
+        warnings.warn(message, stacklevel=3)
+    return motions
+
+
+def _progress(what: str, total: int) -> tqdm:
+    return tqdm(total=total, desc=what, unit="clip", leave=False, delay=2)

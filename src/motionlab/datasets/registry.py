@@ -1,0 +1,312 @@
+"""What there is: sources, their licences, and a table of all clips. Needs no data."""
+
+from __future__ import annotations
+
+import html
+import textwrap
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from ..errors import DataError
+from .splits import SPLITS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+GAITS, EXAMPLES = "gaits", "examples"
+# of `table`
+COLUMNS = [
+    "source",
+    "name",
+    "action",
+    "style",
+    "split",
+    "frames",
+    "fps",
+    "seconds",
+    "bytes",
+    "performance",
+    "path",
+    "url",
+]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a set of clips comes from and what may be done with it."""
+
+    name: str
+    title: str
+    url: str  # what the clips' paths are relative to
+    home: str
+    units: float  # metres per unit of length in the files
+    licence: str
+    commercial: bool
+    citation: str
+    quirks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One row of clips.tsv."""
+
+    source: str
+    path: str
+    sha256: str
+    bytes: int
+    frames: int  # after leaving out `skip`
+    fps: float  # the true rate, whatever the header says
+    skip: int  # frames in front that are calibration, not motion
+    action: str
+    style: str
+    performance: str  # clips with the same performance of a source share frames or the stage
+    split: str
+
+    @property
+    def name(self) -> str:
+        return clip_name(self.path)
+
+    @property
+    def seconds(self) -> float:
+        return self.frames / self.fps
+
+    @property
+    def url(self) -> str:
+        return sources()[self.source].url + quote(self.path)
+
+
+def clip_name(path: str) -> str:
+    """The file's name without .bvh; a bare number takes its folder's name in front."""
+    path = PurePosixPath(path)
+    return f"{path.parent.name}_{path.stem}" if path.stem.isdigit() else path.stem
+
+
+def _text(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def _toml() -> dict:
+    return tomllib.loads(_text("sources.toml"))
+
+
+@cache
+def sources() -> dict[str, Source]:
+    """All sources by name."""
+    tables = {name: table for name, table in _toml().items() if name != EXAMPLES}
+    return {
+        name: Source(name=name, **{**table, "quirks": tuple(table["quirks"])})
+        for name, table in tables.items()
+    }
+
+
+@cache
+def clips() -> tuple[Clip, ...]:
+    """All clips of all sources, by source and path."""
+    header, *lines = _text("clips.tsv").splitlines()
+    kinds = {field.name: field.type for field in fields(Clip)}
+    convert = [{"int": int, "float": float, "str": str}[kinds[name]] for name in header.split("\t")]
+    rows = (line.split("\t") for line in lines)
+    found = (Clip(*(to(cell) for to, cell in zip(convert, row, strict=True))) for row in rows)
+    return tuple(
+        clip if clip.performance else replace(clip, performance=clip.name) for clip in found
+    )
+
+
+def names() -> list[str]:
+    """Names that `load`, `info` and `table` know."""
+    return [GAITS, EXAMPLES, *sources()]
+
+
+def check_name(name: str) -> None:
+    if name not in names():
+        raise DataError(f"There is no data set {name!r}; there are {', '.join(names())}.")
+
+
+def check_split(split: str | None) -> None:
+    if split is not None and split not in SPLITS:
+        raise DataError(f"There is no split {split!r}; use one of {', '.join(SPLITS)}, or None.")
+
+
+def members(name: str) -> list[Clip]:
+    """The clips of a named data set (not of the gaits, which have no files)."""
+    check_name(name)
+    if name == EXAMPLES:
+        by_name = {f"{clip.source}/{clip.name}": clip for clip in clips()}
+        return [by_name[key] for key in _toml()[EXAMPLES]["clips"]]
+    return [clip for clip in clips() if clip.source == name]
+
+
+def choose(name: str, split: str | None = None, wanted: Sequence[str] | None = None) -> list[Clip]:
+    """Members of a data set, of one split, or those wanted by name.
+
+    Raises
+    ------
+    DataError : the data set, the split or a wanted clip does not exist.
+    """
+    check_split(split)
+    found = members(name)
+    if wanted is not None:
+        check_wanted(wanted, [clip.name for clip in found], name)
+        found = [clip for clip in found if clip.name in set(wanted)]
+    return [clip for clip in found if split in (None, clip.split)]
+
+
+def check_wanted(wanted: Sequence[str], known: Iterable[str], name: str) -> None:
+    if isinstance(wanted, str):
+        raise DataError(f"clips={wanted!r} must be a list of names: clips=[{wanted!r}].")
+    known = list(known)
+    for clip in wanted:
+        if clip not in known:
+            near = get_close_matches(clip, known, 3, 0.3) or known[:3]
+            raise DataError(
+                f"Data set {name!r} has no clip {clip!r}; did you mean {', '.join(near)}? "
+                f"motionlab.datasets.table({name!r}) lists all {len(known)}."
+            )
+
+
+@dataclass(frozen=True, repr=False)
+class Info:
+    """A data set at a glance: how much, under which licence, with what peculiarities."""
+
+    name: str
+    title: str
+    clips: int
+    minutes: float
+    bytes: int
+    licence: str
+    commercial: bool
+    citation: str
+    home: str
+    quirks: tuple[str, ...]
+    splits: dict[str, int]
+
+    def _rows(self) -> list[tuple[str, str]]:
+        size = f", {self.bytes / 1e6:.1f} MB of files" if self.bytes else ""
+        splits = ", ".join(f"{count} {name}" for name, count in self.splits.items())
+        return [
+            ("clips", f"{self.clips} ({splits}), {self.minutes:.1f} minutes{size}"),
+            ("licence", self.licence),
+            ("cite", self.citation),
+            ("home", self.home),
+            *(("quirk", quirk) for quirk in self.quirks),
+        ]
+
+    def __repr__(self) -> str:
+        rows = [
+            textwrap.fill(f"  {key:8} {value}", 100, subsequent_indent=" " * 11)
+            for key, value in self._rows()
+            if value
+        ]
+        return "\n".join([f"{self.name}: {self.title}", *rows])
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><th style='text-align:left'>{key}</th>"
+            f"<td style='text-align:left'>{html.escape(value)}</td></tr>"
+            for key, value in self._rows()
+            if value
+        )
+        title = f"<caption><b>{self.name}</b>: {html.escape(self.title)}</caption>"
+        return f"<table>{title}{rows}</table>"
+
+
+def info(name: str) -> Info:
+    """Title, size, licence, citation and quirks of a data set. Needs no data.
+
+    Raises
+    ------
+    DataError : there is no such data set.
+    """
+    check_name(name)
+    rows = table(name)
+    about: dict = {
+        "name": name,
+        "clips": len(rows),
+        "minutes": rows.seconds.sum() / 60,
+        "bytes": int(rows.bytes.sum()),
+        "splits": {split: int((rows.split == split).sum()) for split in SPLITS},
+    }
+    if name == GAITS:
+        return Info(
+            **about,
+            title="Procedural walking and running with exact contact labels",
+            licence="MIT, as motionlab",
+            commercial=True,
+            citation="",
+            home="",
+            quirks=("Made by motionlab.datasets.gaits; needs no file and no network.",),
+        )
+    if name == EXAMPLES:
+        used = [sources()[source] for source in dict.fromkeys(c.source for c in members(name))]
+        return Info(
+            **about,
+            title=_toml()[EXAMPLES]["title"],
+            licence="; ".join(f"{s.name}: {_licence(s)}" for s in used),
+            commercial=all(s.commercial for s in used),
+            citation="as the sources: " + ", ".join(s.name for s in used),
+            home="",
+            quirks=(),
+        )
+    source = sources()[name]
+    return Info(
+        **about,
+        title=source.title,
+        licence=_licence(source),
+        commercial=source.commercial,
+        citation=source.citation,
+        home=source.home,
+        quirks=source.quirks,
+    )
+
+
+def _licence(source: Source) -> str:
+    return source.licence + ("" if source.commercial else " (non-commercial)")
+
+
+def table(name: str | None = None) -> pd.DataFrame:
+    """Clips as a pandas DataFrame, one row each; of all sources, or of one data set.
+
+    Columns: source, name, action, style, split, frames, fps, seconds, bytes, performance, path,
+    url. Needs no data.
+
+    Raises
+    ------
+    DataError : there is no such data set.
+    """
+    import pandas as pd
+
+    if name == GAITS:
+        return pd.DataFrame(_gait_rows(), columns=COLUMNS)
+    found = clips() if name is None else members(name)
+    rows = [[getattr(clip, column) for column in COLUMNS] for clip in found]
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _gait_rows() -> list[dict]:
+    from . import gaits
+
+    return [
+        {
+            "source": GAITS,
+            "name": motion.name,
+            "action": motion.name.split("_")[0],
+            "style": "",
+            "split": split,
+            "frames": len(motion),
+            "fps": motion.fps,
+            "seconds": motion.seconds,
+            "bytes": 0,
+            "performance": motion.name,
+            "path": "",
+            "url": "",
+        }
+        for motion, split in zip(gaits.load(), gaits.splits(), strict=True)
+    ]
