@@ -1,0 +1,32 @@
+"""Look at motion: a player in the notebook and in the page, stills, film strips, videos, scenes."""
+
+from importlib import import_module
+
+from . import palette
+from .player import Player, bundle_path
+from .show import show
+
+# Drawn by libraries that take their time to load: imported when first used.
+_STILLS = ("still", "filmstrip", "video")
+__all__ = [
+    "Player",
+    "bundle_path",
+    "filmstrip",
+    "palette",
+    "plots",
+    "scene",
+    "show",
+    "still",
+    "video",
+]
+
+
+def __getattr__(name: str):
+    if name in _STILLS:
+        return getattr(import_module(".stills", __name__), name)
+    if name == "plots":
+        return import_module(".plots", __name__)
+    if name == "scene":
+        globals()[name] = import_module(".scene", __name__).scene  # not the module of that name
+        return globals()[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,192 @@
+"""Curves and diagrams of motion, in matplotlib. One style for the whole book: `style.mplstyle`.
+
+Every function returns a figure, transparent and legible on light and dark pages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import wraps
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from ..motion import Motion
+from . import palette
+
+STYLE = Path(__file__).with_name("style.mplstyle")
+# viridis without its ends, which vanish on a black or a white page
+SPEED = ListedColormap(plt.get_cmap("viridis")(np.linspace(0.3, 0.92, 128)))
+INK = "#808080"  # as the style's text: 4:1 on white and on black
+
+
+def styled(draw):
+    """Draw in the book's style; the figure is returned, not also shown by pyplot."""
+
+    @wraps(draw)
+    def drawn(*args, **kwargs) -> Figure:
+        with plt.style.context(STYLE):
+            figure = draw(*args, **kwargs)
+        plt.close(figure)
+        return figure
+
+    return drawn
+
+
+@styled
+def joint_map(motion: Motion, frame: int = 0) -> Figure:
+    """The hierarchy on the body: bones as lines, joints by name, seen from the front.
+
+    The left half of the body is named on the right of the picture, as on someone who faces you.
+    """
+    skeleton = motion.skeleton
+    points = motion.positions()[frame].numpy()
+    across = _across(motion, points)
+    x = (points - points[0])[:, [0, 2]] @ across  # metres to the body's left
+    y = points[:, 1] - points[:, 1].min()
+    figure, axes = plt.subplots(figsize=(7, 6))
+    for point, parent in enumerate(skeleton.point_parents):
+        if parent >= 0:
+            end = point >= skeleton.joints
+            style = dict(color=INK if end else palette.CYCLE[0], lw=1 if end else 2.5)
+            axes.plot(x[[parent, point]], y[[parent, point]], solid_capstyle="round", **style)
+    joints = slice(0, skeleton.joints)
+    axes.scatter(x[joints], y[joints], color=palette.CYCLE[1], s=28, zorder=3)
+    _name_joints(axes, skeleton, x, y)
+    axes.set(xlabel="to the body's left (m)", ylabel="height (m)", aspect="equal")
+    axes.set_xlim(-1.15, 1.15)
+    return figure
+
+
+def _across(motion: Motion, points: np.ndarray) -> np.ndarray:
+    """Unit vector on the ground, (2,) x and z, towards the body's left."""
+    roles = motion.skeleton.roles
+    if {"left_upper_leg", "right_upper_leg"} <= roles.keys():
+        line = points[roles["left_upper_leg"]] - points[roles["right_upper_leg"]]
+        line = line[[0, 2]]
+        if np.linalg.norm(line) > 1e-6:
+            return line / np.linalg.norm(line)
+    return np.array([1.0, 0.0])
+
+
+def _name_joints(axes, skeleton, x: np.ndarray, y: np.ndarray) -> None:
+    """Names in two columns beside the body, in order of height, none over another."""
+    left = x[: skeleton.joints] >= np.median(x[: skeleton.joints]) - 1e-3
+    for side, column, align in ((True, 0.62, "left"), (False, -0.62, "right")):
+        joints = [j for j in np.argsort(-y[: skeleton.joints]) if left[j] == side]
+        heights = np.linspace(y.max(), 0.02, max(len(joints), 2))
+        for joint, height in zip(joints, heights, strict=False):
+            axes.annotate(
+                skeleton.names[joint], (x[joint], y[joint]), (column, height),
+                ha=align, va="center", fontsize=9,
+                arrowprops=dict(arrowstyle="-", color=INK, lw=0.5, alpha=0.6),
+            )  # fmt: skip
+
+
+@styled
+def bars(values: Sequence[float], names: Sequence[str], label: str) -> Figure:
+    """One bar a name, in the given order; `label` names the quantity with its unit."""
+    values = np.asarray(values, dtype=float)
+    figure, axes = plt.subplots(figsize=(7, 0.6 + 0.2 * len(values)))
+    axes.barh(range(len(values)), values, color=palette.CYCLE[0], height=0.7)
+    axes.set_yticks(range(len(values)), names, fontsize=9)
+    axes.invert_yaxis()
+    axes.set_xlabel(label)
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+@styled
+def curves(
+    lines: Mapping[str, tuple[Sequence[float], Sequence[float]]],
+    x: str,
+    y: str,
+    log: bool = False,
+) -> Figure:
+    """Named lines ``{name: (xs, ys)}`` over labelled axes, with a mark at every value."""
+    figure, axes = plt.subplots()
+    for index, (name, (xs, ys)) in enumerate(lines.items()):
+        axes.plot(xs, ys, "o-", label=name, color=palette.color(name, index))
+    if log:
+        axes.set(xscale="log", yscale="log")
+        ticks = sorted({float(value) for xs, _ in lines.values() for value in xs})
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
+        axes.yaxis.set_major_formatter("{x:g}")
+    axes.set(xlabel=x, ylabel=y)
+    axes.legend()
+    return figure
+
+
+@styled
+def root_paths(motions: Sequence[Motion], labels: Sequence[str] | None = None) -> Figure:
+    """The way of the root over the ground, seen from above; colour is speed, a dot each second.
+
+    Every path starts at (0, 0), so that shapes can be compared.
+    """
+    labels = labels or [motion.name for motion in motions]
+    figure, axes = plt.subplots(figsize=(7, 5))
+    speeds = [_ground_speed(motion) for motion in motions]
+    top = max(float(np.percentile(speed, 98)) for speed in speeds)
+    for motion, speed, label in zip(motions, speeds, labels, strict=True):
+        path = (motion.root_positions - motion.root_positions[0]).numpy()[:, [0, 2]]
+        segments = np.stack([path[:-1], path[1:]], axis=1)
+        lines = LineCollection(segments, array=speed, cmap=SPEED, lw=3, capstyle="round")
+        lines.set_clim(0, top)
+        axes.add_collection(lines)
+        second = path[:: max(round(motion.fps), 1)]
+        axes.scatter(*second.T, s=14, color="white", edgecolor=INK, zorder=3)
+        axes.annotate(label, path[-1], (6, 6), textcoords="offset points", fontsize=10)
+    figure.colorbar(lines, ax=axes, label="speed of the root (m/s)", shrink=0.8)
+    axes.set(xlabel="x (m)", ylabel="z (m)", aspect="equal")
+    axes.margins(0.15)
+    axes.autoscale_view()
+    return figure
+
+
+def _ground_speed(motion: Motion) -> np.ndarray:
+    """(frames - 1,) m/s over the ground."""
+    return motion.root_positions[:, [0, 2]].diff(dim=0).norm(dim=-1).numpy() * motion.fps
+
+
+@styled
+def feet(motion: Motion, threshold: float = 0.45) -> Figure:
+    """Height and speed of both toes over time, and when they are slower than `threshold` m/s.
+
+    Where the motion carries contact labels, these are drawn under the guess.
+    """
+    figure, (height, speed, contact) = plt.subplots(
+        3, 1, figsize=(7.5, 5.5), sharex=True, height_ratios=(2, 2, 1)
+    )
+    time = np.arange(len(motion)) / motion.fps
+    positions = motion.positions()
+    for row, (side, color) in enumerate(zip(("left", "right"), palette.CYCLE, strict=False)):
+        role = f"{side}_toes" if f"{side}_toes" in motion.skeleton.roles else f"{side}_foot"
+        toe = positions[:, motion.skeleton.index(role)].numpy()
+        pace = np.linalg.norm(np.gradient(toe, axis=0), axis=-1) * motion.fps
+        height.plot(time, toe[:, 1] * 100, color=color, label=f"{side} toe")
+        speed.plot(time, pace, color=color)
+        _spans(contact, time, pace < threshold, row, color)
+        if motion.contacts is not None:
+            exact = motion.contacts[:, 2 * row + 1].numpy()
+            _spans(contact, time, exact, row + 0.42, color, height=0.18)
+    speed.axhline(threshold, color=INK, ls="--", lw=1)
+    height.set(ylabel="height (cm)")
+    speed.set(ylabel="speed (m/s)")
+    contact.set(xlabel="time (s)", yticks=[0, 1], yticklabels=["left", "right"], ylim=(1.6, -0.5))
+    contact.set_ylabel("in contact")
+    contact.grid(axis="y", visible=False)
+    height.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
+    return figure
+
+
+def _spans(axes, time: np.ndarray, on: np.ndarray, row: float, color, height: float = 0.5) -> None:
+    """Bars from the first to the last frame of every run of True."""
+    edges = np.flatnonzero(np.diff(np.r_[False, on, False].astype(int)))
+    step = time[1] - time[0] if len(time) > 1 else 0
+    runs = [(time[a], (b - a) * step) for a, b in edges.reshape(-1, 2)]
+    axes.broken_barh(runs, (row - height / 2, height), color=color)

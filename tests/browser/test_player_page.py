@@ -1,0 +1,249 @@
+"""The player in a page opened from disk, as a reader meets it: no kernel, no server, no network."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+import torch
+
+from motionlab import Motion, Skeleton
+from motionlab.viewer.player import bundle_path
+from motionlab.viewer.show import show
+
+check_book = pytest.importorskip("check_book", exc_type=ImportError)
+sync_api = pytest.importorskip("playwright.sync_api")
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
+<meta name="viewport" content="width=device-width"><title>players</title>
+<script src="player.js"></script><body style="margin: 8px">{}</body></html>"""
+
+
+def waving() -> Motion:
+    """Ten seconds: the arms swing, the body walks 8 m."""
+    skeleton, frames = Skeleton.canonical(), 300
+    turns = torch.eye(3).repeat(frames, skeleton.joints, 1, 1)
+    angle = torch.sin(torch.arange(frames) / 8)
+    for role in ("left_upper_arm", "right_upper_leg"):
+        spin = turns[:, skeleton.index(role)]
+        spin[:, 1, 1] = spin[:, 2, 2] = angle.cos()
+        spin[:, 1, 2], spin[:, 2, 1] = -angle.sin(), angle.sin()
+    root = torch.zeros(frames, 3)
+    root[:, 1], root[:, 2] = 0.85, torch.linspace(0, 8, frames)
+    contacts = torch.rand(frames, 4, generator=torch.Generator().manual_seed(0)) > 0.5
+    return Motion(skeleton, root, turns, 30.0, "walk", contacts=contacts)
+
+
+@pytest.fixture(scope="module")
+def page_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    shutil.copy(bundle_path(), folder / "player.js")
+    motion = waving()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOTIONLAB_VIEWER", "page")
+        figures = [
+            show(motion, contacts=True, trail="left_hand", paths=[[0, 0], [0, 8]], height=240),
+            show([motion, motion.mirror()], labels=["mocap", "RNN"], caption="two", height=240),
+            *[show(motion[:20], height=160) for _ in range(16)],  # more than WebGL contexts
+        ]
+    html = PAGE.format("<p>text</p>".join(figure.html for figure in figures))
+    (folder / "page.html").write_text(html, encoding="utf-8")
+    return folder / "page.html"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    try:
+        path = check_book.chromium()
+    except SystemExit as missing:
+        pytest.skip(str(missing))
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=check_book.FLAGS)
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(browser, file, flags=(), **settings):
+    """The page in a fresh window without network; fails if it logged an error or asked for more."""
+    size = {"width": 700, "height": 700}
+    window = browser.new_context(**{"viewport": size, "offline": True, **settings})
+    visit = check_book.Visit(window, file.as_uri())
+    try:
+        yield visit.page
+        assert visit.troubles == []
+        assert {url.rsplit("/", 1)[1] for url in visit.loaded if "data:" not in url} <= {
+            file.name,
+            "player.js",
+        }
+    finally:
+        window.close()
+
+
+def first(page):
+    return page.locator("figure.motionlab-player").first
+
+
+def frame(figure) -> int:
+    return int(figure.get_attribute("data-frame"))
+
+
+def picture(page, figure) -> bytes:
+    page.wait_for_timeout(500)
+    return figure.locator("canvas").screenshot()
+
+
+def test_it_plays_scrubs_and_listens_to_keys(browser, page_file):
+    with opened(browser, page_file) as page:
+        figure = first(page)
+        before, start = picture(page, figure), frame(figure)
+        page.wait_for_timeout(700)
+        assert picture(page, figure) != before and frame(figure) != start
+
+        figure.get_by_role("button", name="Pause").click()
+        figure.get_by_label("Frame").fill("200")
+        assert frame(figure) == 200
+        there = picture(page, figure)
+        figure.get_by_label("Frame").fill("30")
+        assert picture(page, figure) != there
+
+        figure.locator("canvas").focus()
+        for key, expected in {"ArrowRight": 31, "End": 299, "PageUp": 269, "Home": 0}.items():
+            page.keyboard.press(key)
+            assert frame(figure) == expected, key
+        still = picture(page, figure)
+        page.keyboard.press("Shift+ArrowLeft")
+        assert picture(page, figure) != still  # turned
+        page.keyboard.press("r")
+        page.keyboard.press(" ")
+        assert figure.evaluate("figure => figure.motionlab.playing")
+
+
+def test_dragging_turns_the_view(browser, page_file):
+    with opened(browser, page_file, reduced_motion="reduce") as page:
+        figure = first(page)
+        before = picture(page, figure)
+        box = figure.locator("canvas").bounding_box()
+        page.mouse.move(box["x"] + 100, box["y"] + 100)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 220, box["y"] + 110, steps=4)
+        page.mouse.up()
+        assert picture(page, figure) != before
+
+
+def test_every_control_has_a_name_and_takes_focus(browser, page_file):
+    with opened(browser, page_file) as page:
+        controls = first(page).locator("button:visible, input, select, canvas")
+        assert controls.count() == 6
+        for i in range(controls.count()):
+            assert controls.nth(i).get_attribute("aria-label")
+            controls.nth(i).focus()
+            assert controls.nth(i).evaluate("e => e === document.activeElement")
+
+
+def test_several_share_one_clock_side_by_side_and_overlaid(browser, page_file):
+    with opened(browser, page_file, reduced_motion="reduce") as page:
+        figure = page.locator("figure.motionlab-player").nth(1)
+        figure.scroll_into_view_if_needed()
+        aside = picture(page, figure)
+        left, right = (figure.locator(".ml-label").nth(i).bounding_box() for i in (0, 1))
+        assert right["x"] - left["x"] > 200
+        assert figure.locator("figcaption").inner_text() == "two"
+        figure.get_by_role("button", name="Show all in one picture").click()
+        assert picture(page, figure) != aside
+        left, right = (figure.locator(".ml-label").nth(i).bounding_box() for i in (0, 1))
+        assert 0 < right["x"] - left["x"] < 200
+
+
+def test_more_players_than_webgl_contexts_all_show(browser, page_file):
+    with opened(browser, page_file, reduced_motion="reduce") as page:
+        figures = page.locator("figure.motionlab-player")
+        for i in range(figures.count()):
+            figures.nth(i).scroll_into_view_if_needed()
+            page.wait_for_function(
+                "i => document.querySelectorAll('figure')[i].motionlab.casts && "
+                "!document.querySelectorAll('figure')[i].motionlab.dirty",
+                arg=i,
+                timeout=20_000,
+            )
+        # The first, long out of sight, keeps its picture: many different pixels, not a blank.
+        page.evaluate("window.scrollTo(0, 0)")
+        colors = first(page).evaluate(
+            "f => { const c = f.querySelector('canvas');"
+            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+            "return new Set(new Uint32Array(d.buffer)).size }"
+        )
+        assert colors > 200
+
+
+def test_it_rests_when_out_of_view(browser, page_file):
+    with opened(browser, page_file) as page:
+        figure = first(page)
+        page.wait_for_timeout(500)
+        page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
+        page.wait_for_timeout(500)
+        resting = frame(figure)
+        page.wait_for_timeout(500)
+        assert frame(figure) == resting
+
+
+def test_reduced_motion_waits_for_the_reader(browser, page_file):
+    with opened(browser, page_file, reduced_motion="reduce") as page:
+        page.wait_for_timeout(800)
+        assert frame(first(page)) == 0
+        first(page).get_by_role("button", name="Play").click()
+        page.wait_for_timeout(800)
+        assert frame(first(page)) > 0
+
+
+def test_it_follows_the_theme_at_run_time(browser, page_file):
+    with opened(browser, page_file, reduced_motion="reduce", color_scheme="dark") as page:
+        figure = first(page)
+        panel = figure.locator(".ml-bar")
+
+        def brightness():
+            rgb = panel.evaluate("e => getComputedStyle(e).backgroundColor.match(/\\d+/g)")
+            return np.mean([int(v) for v in rgb[:3]])
+
+        assert figure.get_attribute("data-ml-theme") == "dark" and brightness() < 80
+        dark = picture(page, figure)
+        page.evaluate("document.documentElement.dataset.theme = 'light'")
+        assert picture(page, figure) != dark
+        assert figure.get_attribute("data-ml-theme") == "light" and brightness() > 180
+        page.evaluate("document.documentElement.dataset.theme = 'dark'")
+        page.wait_for_timeout(100)
+        assert brightness() < 80
+
+
+def test_it_fits_a_phone(browser, page_file):
+    phone = {"width": 390, "height": 800}
+    with opened(browser, page_file, viewport=phone, has_touch=True) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        for control in first(page).locator("button:visible, select").all():
+            box = control.bounding_box()
+            assert min(box["width"], box["height"]) >= 40  # a finger's width
+
+
+def test_without_scripts_there_is_a_still(browser, page_file):
+    window = browser.new_context(java_script_enabled=False)
+    page = window.new_page()
+    page.goto(page_file.as_uri())
+    assert page.locator("figure img").first.is_visible()
+    window.close()
+
+
+def test_without_webgl_it_says_so_and_shows_the_still(browser, page_file):
+    window = browser.new_context()
+    window.add_init_script(
+        "const get = HTMLCanvasElement.prototype.getContext;"
+        "HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {"
+        "  return kind.startsWith('webgl') ? null : get.call(this, kind, ...rest) }"
+    )
+    visit = check_book.Visit(window, page_file.as_uri())
+    visit.page.wait_for_selector("figure img")
+    assert "WebGL" in first(visit.page).locator(".ml-note").inner_text()
+    assert visit.troubles == []
+    window.close()

@@ -1,0 +1,48 @@
+import matplotlib
+import numpy as np
+import pytest
+
+matplotlib.use("agg")
+
+from motionlab.datasets import gaits  # noqa: E402
+from motionlab.viewer import plots  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return gaits.make(seconds=3, speed=1.3, seed=1)
+
+
+def test_the_map_names_every_joint_on_its_own_side(walk):
+    (axes,) = plots.joint_map(walk, 10).axes
+    columns = {note.get_text(): note.xyann[0] for note in axes.texts}
+    assert set(columns) == set(walk.skeleton.names)
+    assert columns["LeftFoot"] > 0 > columns["RightFoot"]
+
+
+def test_bars_keep_values_and_order():
+    (axes,) = plots.bars([3, 1, 2], ["a", "b", "c"], "error (cm)").axes
+    assert [bar.get_width() for bar in axes.patches] == [3, 1, 2]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b", "c"]
+
+
+def test_curves_hold_their_data():
+    (axes,) = plots.curves({"one": ([1, 10], [2, 20])}, x="fps", y="cm", log=True).axes
+    assert axes.lines[0].get_xydata().tolist() == [[1, 2], [10, 20]]
+    assert axes.get_xlabel() == "fps" and axes.get_xscale() == "log"
+
+
+def test_root_paths_start_at_zero_and_end_where_the_root_goes(walk):
+    axes, *_ = plots.root_paths([walk], ["walk"]).axes
+    way = np.array(axes.collections[0].get_segments())
+    root = (walk.root_positions - walk.root_positions[0]).numpy()[:, [0, 2]]
+    assert np.allclose(way[0, 0], 0) and np.allclose(way[-1, -1], root[-1], atol=1e-6)
+
+
+def test_feet_draws_a_bar_for_every_exact_contact(walk):
+    height, speed, contact = plots.feet(walk).axes
+    drawn = sum(len(bars.get_paths()) for bars in contact.collections)
+    toes = walk.contacts[:, [1, 3]].int()
+    runs = int(toes[0].sum() + (toes.diff(dim=0) == 1).sum())
+    assert drawn >= runs > 2
+    assert len(height.lines) == 2 and len(speed.lines) == 3

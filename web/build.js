@@ -1,0 +1,22 @@
+// Bundles src/ into the two files that motionlab ships (called by ../hatch_build.py):
+//   player.js  a classic script for built pages: works from disk, asks the network for nothing;
+//   widget.js  the same player as an ES module for anywidget.
+import { fileURLToPath } from "node:url";
+import { build } from "esbuild";
+
+const at = (path) => fileURLToPath(new URL(path, import.meta.url));
+
+const common = {
+  bundle: true,
+  minify: true,
+  target: "es2020",
+  charset: "utf8",
+  legalComments: "eof",
+  loader: { ".css": "text" },
+  logLevel: "warning",
+};
+
+for (const [entry, format, file] of [["page", "iife", "player"], ["widget", "esm", "widget"]]) {
+  const outfile = at(`../src/motionlab/viewer/static/${file}.js`);
+  await build({ ...common, entryPoints: [at(`src/${entry}.js`)], format, outfile });
+}

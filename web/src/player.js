@@ -1,0 +1,361 @@
+// The motion player: puts figures, marks, camera, clock and controls together in one element.
+import { Bar } from "./bar.js";
+import { Orbit, smoothCourse } from "./camera.js";
+import { Clock } from "./clock.js";
+import { Mannequin } from "./mannequin.js";
+import { Contacts, disposeAll, Path, Trail } from "./marks.js";
+import { decode } from "./motion.js";
+import { addStyle } from "./style.js";
+import { sharedStage } from "./stage.js";
+import { currentTheme, THEMES, watchTheme } from "./theme.js";
+
+const REDUCED = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)");
+const SLOW = 0.05; // seconds from picture to picture above which they get fewer pixels
+const LEAST_HEIGHT = 1.5; // metres that a view shows
+
+export class Player {
+  /** Build the player inside `host`. `still` is an image URL for machines without WebGL. */
+  constructor(host, payload, still) {
+    addStyle(host);
+    this.host = host;
+    this.still = still;
+    this.tracks = decode(payload);
+    this.payload = payload;
+    this.clock = new Clock(payload.frames, payload.fps);
+    this.clock.speed = payload.speed ?? 1;
+    this.follow = payload.follow ?? true;
+    this.overlay = payload.overlay ?? false;
+    this.visible = false;
+    this.dirty = true;
+    this.courses = this.tracks.map((track) => smoothCourse(track, payload.fps));
+    // At least as tall as a man standing, so that a crawling body looks as small as it is.
+    this.tall = Math.max(...this.tracks.map((track) => track.top() - payload.floor), LEAST_HEIGHT);
+    this.build(payload);
+    this.watch();
+    this.sayFrame();
+    // Without a finger on it, motion starts only where the reader has not asked for calm.
+    this.clock.playing = Boolean(payload.autoplay) && !REDUCED?.matches;
+    this.refresh();
+  }
+
+  build({ height, frames, fps }) {
+    this.view = document.createElement("div");
+    this.view.className = "ml-view";
+    this.view.style.height = `${height}px`;
+    this.canvas = document.createElement("canvas");
+    this.canvas.tabIndex = 0;
+    this.canvas.setAttribute("role", "img");
+    const names = this.tracks.map((track) => track.label).filter(Boolean).join(", ") || "a motion";
+    this.canvas.setAttribute(
+      "aria-label",
+      `Moving figure: ${names}, ${(frames / fps).toFixed(1)} seconds. Space plays and pauses, arrow keys ` +
+        "step, Home and End jump, Shift with arrows turns the view, plus and minus zoom, F follows, R resets.",
+    );
+    this.labels = document.createElement("div");
+    this.labels.className = "ml-labels";
+    this.labels.setAttribute("aria-hidden", "true");
+    this.view.append(this.canvas, this.labels);
+    this.bar = new Bar(this, frames, fps, this.tracks.length > 1);
+    this.host.append(this.view, this.bar.element);
+    this.orbit = new Orbit(this.canvas, !REDUCED?.matches);
+    this.orbit.controls.addEventListener("change", () => { this.dirty = true; });
+    this.view.addEventListener("keydown", (event) => this.key(event));
+    this.lookFromStart();
+  }
+
+  watch() {
+    const margin = "150px"; // be ready a little before the player scrolls into the window
+    this.sight = new IntersectionObserver(([entry]) => this.seen(entry.isIntersecting), { rootMargin: margin });
+    this.sight.observe(this.view);
+    this.resizing = new ResizeObserver(() => { this.dirty = true; });
+    this.resizing.observe(this.view);
+    this.unwatchTheme = watchTheme((theme) => this.paint(theme));
+    this.paint(currentTheme());
+  }
+
+  /** Figures are made when first seen: a page may hold many players. */
+  seen(visible) {
+    this.visible = visible;
+    if (visible && !this.casts) this.enter();
+    if (visible) turning.add(this);
+    else turning.delete(this);
+    keepTurning();
+  }
+
+  enter() {
+    this.stage = sharedStage();
+    if (!this.stage) return this.sayMissing();
+    // Pixels of the picture per pixel of the page: while it rests, and while it moves.
+    this.fine = this.stage.software ? 1.5 : Math.min(globalThis.devicePixelRatio || 1, 2);
+    this.coarse = this.stage.software ? 1 : this.fine;
+    const paths = this.payload.paths ?? [];
+    this.casts = this.tracks.map((track, i) => [
+      new Mannequin(track),
+      ...(track.contacts ? [new Contacts(track, this.payload.floor)] : []),
+      ...(this.payload.trail ?? []).map((point) => new Trail(track, point)),
+      ...paths.filter((path) => path.track == null || path.track === i).map((path) => new Path(path, this.payload.floor)),
+    ]);
+    this.dirty = true;
+  }
+
+  sayMissing() {
+    const note = document.createElement("p");
+    note.className = "ml-note";
+    note.textContent = "This browser shows no WebGL, which the moving figure needs; here is a still picture of it.";
+    this.canvas.remove();
+    if (this.still) this.view.append(Object.assign(new Image(), { src: this.still, alt: "Still picture of the motion" }));
+    this.view.append(note);
+  }
+
+  // -- what the page, the widget and the controls call -------------------------------------------
+
+  get frame() { return this.clock.frame; }
+  get playing() { return this.clock.playing; }
+  get speed() { return this.clock.speed; }
+
+  setFrame(frame) {
+    this.clock.seek(frame);
+    this.refresh();
+  }
+
+  /** Take time in hand: go to a frame and stay there. */
+  scrub(frame) {
+    if (this.playing) this.pause();
+    this.setFrame(frame);
+  }
+
+  play() { this.set("playing", true); }
+  pause() { this.set("playing", false); }
+  toggle() { this.set("playing", !this.playing); }
+
+  /** Set playing, speed, follow or overlay. */
+  set(name, value) {
+    const owner = name === "playing" || name === "speed" ? this.clock : this;
+    if (owner[name] === value) return;
+    owner[name] = value;
+    if (name === "follow" || name === "overlay") this.lookFromStart(true);
+    this.refresh();
+    this.tell("motionlab:state", { name, value });
+  }
+
+  reset() {
+    this.lookFromStart();
+    this.scrub(0);
+  }
+
+  // -- time ---------------------------------------------------------------------------------------
+
+  tick(seconds) {
+    if (this.clock.tick(seconds)) {
+      this.economise(seconds);
+      this.refresh();
+    }
+    if (this.orbit.controls.update()) this.dirty = true;
+    if (this.dirty && this.casts) this.draw();
+  }
+
+  refresh() {
+    this.dirty = true;
+    this.bar.show(this);
+    if (this.frame !== this.told) this.sayFrame();
+  }
+
+  sayFrame() {
+    this.told = this.frame;
+    this.host.dataset.frame = this.frame;
+    this.tell("motionlab:frame", { frame: this.frame });
+  }
+
+  tell(type, detail) {
+    this.host.dispatchEvent(new CustomEvent(type, { detail, bubbles: true }));
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const second = Math.round(this.clock.fps);
+    const actions = {
+      " ": () => this.toggle(),
+      ArrowLeft: () => this.scrub(this.frame - 1),
+      ArrowRight: () => this.scrub(this.frame + 1),
+      PageUp: () => this.scrub(this.frame - second),
+      PageDown: () => this.scrub(this.frame + second),
+      Home: () => this.scrub(0),
+      End: () => this.scrub(this.clock.frames - 1),
+      f: () => this.set("follow", !this.follow),
+      o: () => this.tracks.length > 1 && this.set("overlay", !this.overlay),
+      r: () => this.reset(),
+      "+": () => this.orbit.turn(0, 0, 1 / 1.15),
+      "-": () => this.orbit.turn(0, 0, 1.15),
+    };
+    const turns = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
+    const action = event.shiftKey && turns[event.key] ? () => this.orbit.turn(...turns[event.key]) : actions[event.key];
+    if (!action) return;
+    event.preventDefault();
+    event.stopPropagation(); // a notebook has its own meaning for these keys
+    action();
+    this.dirty = true;
+  }
+
+  // -- picture ------------------------------------------------------------------------------------
+
+  /** Which tracks share a picture: each its own, or all together. */
+  get cells() {
+    return this.overlay ? [this.tracks.map((_, i) => i)] : this.tracks.map((_, i) => [i]);
+  }
+
+  /** Take the starting view; with `keepAngle` only the distance changes. */
+  lookFromStart(keepAngle = false) {
+    const [dx, dz] = heading(this.courses[0]);
+    const arm = this.orbit.eye.position;
+    this.azimuth = Math.atan2(dx, dz) + 0.9;
+    const azimuth = keepAngle ? Math.atan2(arm.x, arm.z) : this.azimuth;
+    const room = Math.max(...this.cells.map((cell) => this.room(cell)));
+    this.orbit.place(azimuth, 2.45 * this.tall + 1.7 * room, this.payload.floor + 0.5 * this.tall);
+    this.dirty = true;
+  }
+
+  /** Metres from the middle of a view to the farthest body in it, at any time. */
+  room(cell) {
+    let most = 0;
+    for (let frame = 0; frame < this.clock.frames; frame += Math.max(1, this.clock.frames >> 6)) {
+      const middle = this.middle(cell, frame);
+      for (const i of cell) {
+        const [x, z] = this.at(i, frame);
+        most = Math.max(most, Math.hypot(x - middle.x, z - middle.z));
+      }
+    }
+    return Math.min(Math.max(most - 0.3, 0), 30);
+  }
+
+  /** Smoothed place of a track on the floor. */
+  at(track, frame) {
+    const course = this.courses[track];
+    const at = Math.min(frame / this.payload.stride, course.length - 1);
+    const [a, b] = [course[Math.floor(at)], course[Math.min(Math.floor(at) + 1, course.length - 1)]];
+    return [0, 1].map((axis) => a[axis] + (at % 1) * (b[axis] - a[axis]));
+  }
+
+  /** Where a view looks: along with its bodies, or at the middle of where they go. */
+  middle(cell, frame) {
+    if (this.follow) {
+      const places = cell.map((i) => this.at(i, frame));
+      const mean = (axis) => places.reduce((sum, place) => sum + place[axis], 0) / places.length;
+      return { x: mean(0), z: mean(1) };
+    }
+    const boxes = cell.map((i) => this.tracks[i].extent);
+    const low = (axis) => Math.min(...boxes.map((box) => box[axis]));
+    const high = (axis) => Math.max(...boxes.map((box) => box[axis + 2]));
+    return { x: (low(0) + high(0)) / 2, z: (low(1) + high(1)) / 2 };
+  }
+
+  draw() {
+    const { clientWidth: width, clientHeight: height } = this.view;
+    if (!width || !height) return;
+    this.dirty = false;
+    for (const track of this.tracks) track.seek(this.clock.time);
+    for (const actor of this.casts.flat()) actor.update();
+    const ratio = this.playing ? this.coarse : this.fine;
+    const size = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (this.canvas.width !== size[0] || this.canvas.height !== size[1]) [this.canvas.width, this.canvas.height] = size;
+    const cells = this.cells;
+    const columns = gridColumns(cells.length, width / height);
+    const rows = Math.ceil(cells.length / columns);
+    const views = cells.map((cell, i) => {
+      const middle = this.middle(cell, this.clock.time);
+      const box = { x: ((i % columns) * width) / columns, y: (Math.floor(i / columns) * height) / rows, width: width / columns, height: height / rows };
+      // Every view gets its turn with the one camera just before it is drawn.
+      return { ...box, middle, floor: this.payload.floor, spread: this.spread, azimuth: this.azimuth, actors: cell.flatMap((k) => this.casts[k]), aim: () => this.orbit.aim(middle, box.width / box.height) };
+    });
+    this.stage.draw(this.canvas, views, THEMES[this.theme], ratio);
+    this.label(views, cells);
+  }
+
+  get spread() {
+    return this.overlay || !this.follow ? Math.min(1.5 + Math.max(...this.cells.map((cell) => this.room(cell))), 8) : this.tall;
+  }
+
+  label(views, cells) {
+    const layout = JSON.stringify([views.map(({ x, y, width, height }) => [x, y, width, height]), this.overlay]);
+    if (layout === this.labelled) return;
+    this.labelled = layout;
+    this.labels.replaceChildren(
+      ...cells.map((cell, i) => {
+        const list = document.createElement("div");
+        list.className = "ml-cell";
+        for (const [side, edge] of [["left", "x"], ["top", "y"], ["width", "width"], ["height", "height"]]) list.style[side] = `${views[i][edge]}px`;
+        list.classList.toggle("ml-right", views[i].x > 0);
+        for (const k of cell) {
+          const { label, color } = this.tracks[k];
+          if (!label) continue;
+          const chip = document.createElement("span");
+          chip.className = "ml-label";
+          chip.style.setProperty("--ml-color", color);
+          chip.textContent = label;
+          list.append(chip);
+        }
+        return list;
+      }),
+    );
+  }
+
+  /**
+   * Slow machines (pictures drawn by the processor) get fewer pixels rather than fewer frames, as
+   * long as the figure moves.
+   */
+  economise(seconds) {
+    this.pace = 0.9 * (this.pace ?? SLOW / 2) + 0.1 * seconds;
+    if (this.pace > SLOW && this.coarse > 0.75) {
+      this.coarse *= 0.85;
+      this.pace = undefined;
+    }
+  }
+
+  paint(theme) {
+    this.theme = theme;
+    this.host.dataset.mlTheme = theme;
+    this.dirty = true;
+  }
+
+  dispose() {
+    this.seen(false);
+    this.sight.disconnect();
+    this.resizing.disconnect();
+    this.unwatchTheme();
+    this.orbit.dispose();
+    for (const actor of this.casts?.flat() ?? []) disposeAll(actor);
+  }
+}
+
+/** Direction on the floor from a course's start to its farthest place; +z if it hardly moves. */
+function heading(course) {
+  const [x0, z0] = course[0];
+  const [x, z] = course.reduce((far, at) => (Math.hypot(at[0] - x0, at[1] - z0) > Math.hypot(far[0] - x0, far[1] - z0) ? at : far));
+  return Math.hypot(x - x0, z - z0) < 0.5 ? [0, 1] : [x - x0, z - z0];
+}
+
+/** Columns that give the views the most upright, yet not too narrow, shape. */
+function gridColumns(count, aspect) {
+  let columns = count;
+  while (columns > 1 && aspect / columns < 0.45) columns = Math.ceil(columns / 2);
+  return columns;
+}
+
+// One loop moves all players that can be seen.
+const turning = new Set();
+let last = null;
+
+function turn(now) {
+  // A frame's time stamp may lie before the call that asked for it; after a long pause don't leap.
+  const seconds = Math.min(Math.max((now - last) / 1000, 0), 0.25);
+  last = now;
+  for (const player of turning) player.tick(seconds);
+  if (turning.size) requestAnimationFrame(turn);
+  else last = null;
+}
+
+function keepTurning() {
+  if (turning.size && last === null) {
+    last = performance.now();
+    requestAnimationFrame(turn);
+  }
+}

@@ -1,0 +1,94 @@
+// One renderer, one light and one floor for all players of a page. Browsers keep about sixteen WebGL
+// contexts and drop the oldest without asking; a chapter may hold more players than that. So players
+// take turns on this stage, and each copies the picture to a plain canvas of its own, where the last
+// one stays when the player leaves the window.
+import { DirectionalLight, Group, HemisphereLight, PCFShadowMap, Scene, WebGLRenderer } from "three";
+import { Ground } from "./ground.js";
+
+const SHARED = "__motionlab_stage_1"; // widgets load this module once each
+
+/** The page's stage, made when the first player comes into view; null where WebGL is missing. */
+export function sharedStage() {
+  if (!(SHARED in globalThis)) {
+    const machine = graphicsMachine();
+    globalThis[SHARED] = machine === null ? null : new Stage(machine);
+  }
+  return globalThis[SHARED];
+}
+
+class Stage {
+  constructor(machine) {
+    // Pictures drawn by the processor (no graphics card): spend fewer pixels.
+    this.software = /swiftshader|llvmpipe|software|basic render/i.test(machine);
+    this.renderer = new WebGLRenderer({ antialias: !this.software, alpha: true, powerPreference: "low-power" });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.scene = new Scene();
+    this.cast = new Group(); // the figures of the player whose turn it is
+    this.ground = new Ground();
+    this.sky = new HemisphereLight("#ffffff", "#9c9488", 1);
+    this.sun = new DirectionalLight("#fff9f0", 3.1);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.setScalar(this.software ? 512 : 1024);
+    this.sun.shadow.radius = 4;
+    this.sun.shadow.bias = -0.0004;
+    this.sun.shadow.normalBias = 0.012;
+    this.rim = new DirectionalLight("#cfe0ff", 0.9);
+    this.scene.add(this.cast, this.ground, this.sky, this.sun, this.sun.target, this.rim, this.rim.target);
+  }
+
+  /**
+   * Draw views onto a 2d canvas. Each view: {actors, aim, middle, floor, spread, azimuth, x, y, width, height},
+   * a rectangle in CSS pixels with y down; `aim()` gives its camera, `middle` is where floor and light go, `spread` the
+   * metres around it that cast shadows, `azimuth` the side the sun is on.
+   */
+  draw(canvas, views, theme, ratio) {
+    const width = canvas.width / ratio;
+    const height = canvas.height / ratio;
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(width, height, false);
+    this.ground.paint(theme);
+    this.sky.intensity = theme.sky;
+    this.rim.intensity = theme.rim;
+    this.renderer.setScissorTest(false); // rounding may leave a column between views: wipe it, too
+    this.renderer.clear();
+    this.renderer.setScissorTest(true);
+    for (const view of views) {
+      this.cast.clear();
+      this.cast.add(...view.actors);
+      this.light(view);
+      const bottom = height - view.y - view.height;
+      this.renderer.setViewport(view.x, bottom, view.width, view.height);
+      this.renderer.setScissor(view.x, bottom, view.width, view.height);
+      this.renderer.render(this.scene, view.aim());
+    }
+    const brush = canvas.getContext("2d");
+    brush.clearRect(0, 0, canvas.width, canvas.height);
+    brush.drawImage(this.renderer.domElement, 0, 0);
+  }
+
+  /** The sun stands to the left of the first view, the rim light opposite; both travel along. */
+  light({ middle, floor, spread, azimuth }) {
+    this.ground.position.set(middle.x, floor, middle.z);
+    for (const [lamp, turn, away, height] of [[this.sun, -0.75, 3.6, 5], [this.rim, 2.6, 5, 3]]) {
+      lamp.target.position.set(middle.x, 0.6, middle.z);
+      const angle = azimuth + turn;
+      lamp.position.set(middle.x + away * Math.sin(angle), height, middle.z + away * Math.cos(angle));
+    }
+    const box = this.sun.shadow.camera;
+    if (box.right !== spread) {
+      Object.assign(box, { left: -spread, right: spread, top: spread, bottom: -spread, near: 0.5, far: 14 + spread });
+      box.updateProjectionMatrix();
+    }
+  }
+}
+
+/** Name of what draws WebGL here ("" if the browser keeps it secret), null if nothing does. */
+function graphicsMachine() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  if (!gl) return null;
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return name;
+}

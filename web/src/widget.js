@@ -1,0 +1,57 @@
+// Entry of the Jupyter widget: ties the player to the traits of motionlab.viewer.Player.
+import { Player } from "./player.js";
+
+const SHARED = ["playing", "speed", "follow", "overlay"];
+const SAVE_EVERY = 200; // milliseconds: while it plays the kernel hears of the frame five times a second
+
+function render({ model, el }) {
+  const host = document.createElement("div");
+  el.append(host);
+  let player;
+  let saved = 0;
+
+  // Front-end links (jslink) listen to `set`; only `save_changes` goes to the kernel.
+  const onFrame = ({ detail }) => {
+    model.set("frame", detail.frame);
+    if (player?.playing && performance.now() - saved < SAVE_EVERY) return;
+    saved = performance.now();
+    model.save_changes();
+  };
+  const onState = ({ detail }) => {
+    model.set(detail.name, detail.value);
+    model.set("frame", player.frame);
+    model.save_changes();
+  };
+
+  const build = () => {
+    player?.dispose();
+    const reduced = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)").matches;
+    host.replaceChildren();
+    player = new Player(host, { ...model.get("payload"), autoplay: false });
+    for (const name of SHARED) player.set(name, model.get(name));
+    player.setFrame(model.get("frame"));
+    if (reduced) player.pause();
+    // JupyterLab has its own use for arrows and space; it looks for this mark on the focused element.
+    for (const control of host.querySelectorAll("canvas, button, input, select")) control.dataset.lmSuppressShortcuts = "";
+    const caption = document.createElement("figcaption");
+    caption.textContent = model.get("caption");
+    if (caption.textContent) host.append(caption);
+    el.motionlab = host.motionlab = player;
+  };
+  build();
+  host.addEventListener("motionlab:frame", onFrame);
+  host.addEventListener("motionlab:state", onState);
+
+  const onModel = {
+    "change:payload": build,
+    "change:frame": () => model.get("frame") !== player.frame && player.setFrame(model.get("frame")),
+    ...Object.fromEntries(SHARED.map((name) => [`change:${name}`, () => player.set(name, model.get(name))])),
+  };
+  for (const [event, react] of Object.entries(onModel)) model.on(event, react);
+  return () => {
+    for (const [event, react] of Object.entries(onModel)) model.off(event, react);
+    player.dispose();
+  };
+}
+
+export default { render };
