@@ -1,0 +1,217 @@
+"""Open every page of the built book as a reader does, with the network off, and look for trouble.
+
+    python tests/browser/check_book.py [book/_build/html]
+
+Each page is opened from disk and from a local server, on a desktop and on a phone. It fails if a
+page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
+if a formula stays TeX; if a player stands still, or does not follow its slider. Exit status 1, and
+one line for each trouble. Needs Chromium on the PATH (or its path in CHROMIUM).
+"""
+
+import functools
+import http.server
+import os
+import shutil
+import sys
+import threading
+from contextlib import contextmanager
+from itertools import product
+from pathlib import Path
+
+from playwright.sync_api import BrowserContext, Page, TimeoutError, sync_playwright
+
+PAGE_BYTES = 2.5e6  # a page's own weight: its HTML and what only it loads
+PATIENCE = 20_000  # milliseconds for a formula, a player or a search to appear
+DESKTOP, PHONE = (1280, 900), (390, 844)
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
+FLAGS = [  # WebGL in software: the machine that checks may have no graphics card
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+PLAYER = ".motionlab-player"
+
+
+class Visit:
+    """One page in a browser window, and what went wrong there."""
+
+    def __init__(self, window: BrowserContext, url: str):
+        self.troubles: list[str] = []
+        self.loaded: set[str] = set()
+        self.page: Page = window.new_page()
+        self.page.route("**/*", self._pass_own_files)
+        self.page.on("console", lambda m: m.type == "error" and self.trouble(f"console: {m.text}"))
+        self.page.on("pageerror", lambda error: self.trouble(f"script: {error}"))
+        self.page.on("requestfailed", lambda r: self.trouble(f"failed to load {r.url}"))
+        self.page.on("response", lambda r: r.status >= 400 and self.trouble(f"{r.status} {r.url}"))
+        self.page.goto(url, wait_until="load")
+        self.page.wait_for_timeout(300)
+
+    def _pass_own_files(self, route):
+        url = route.request.url
+        if url.startswith(("file:", "http://127.0.0.1:", "data:", "blob:")):
+            self.loaded.add(url.split("?")[0].split("#")[0])
+            route.continue_()
+        else:
+            self.trouble(f"asks for {url}")
+            route.abort()
+
+    def trouble(self, text: str) -> None:
+        if text not in self.troubles:
+            self.troubles.append(text)
+
+    def check_width(self) -> None:
+        content, window = self.page.evaluate(
+            "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+        )
+        if content > window:
+            self.trouble(f"scrolls sideways: {content} px wide in a window of {window}")
+
+    def check_math(self) -> None:
+        formulas = self.page.locator(".math:not(mjx-container)").count()
+        if formulas:
+            try:
+                self.page.wait_for_selector("mjx-container svg", state="attached", timeout=PATIENCE)
+            except TimeoutError:
+                self.trouble(f"{formulas} formulas and none drawn")
+        if self.page.locator("mjx-merror, [data-mjx-error]").count():
+            self.trouble("a formula that MathJax does not understand")
+
+    def check_players(self) -> None:
+        for number in range(self.page.locator(PLAYER).count()):
+            self._check_player(number)
+
+    def _check_player(self, number: int) -> None:
+        player = self.page.locator(PLAYER).nth(number)
+        name = f"player {number + 1}"
+        player.scroll_into_view_if_needed()
+        try:
+            player.locator("canvas").wait_for(timeout=PATIENCE)
+            slider = player.locator("input[type=range]").first
+            slider.wait_for(timeout=PATIENCE)
+        except TimeoutError:
+            self.trouble(f"{name} did not start")
+            return
+        frame = functools.partial(slider.evaluate, "s => Number(s.value)")
+        last = slider.evaluate("s => Number(s.max)")
+
+        self._play(player, True)
+        before, first = frame(), self._picture(player)
+        self.page.wait_for_timeout(900)
+        if self._picture(player) == first or frame() == before:
+            self.trouble(f"{name} does not move")
+
+        self._play(player, False)
+        pictures = []
+        for share in (0.2, 0.7):
+            target = round(share * last)
+            slider.fill(str(target))
+            self.page.wait_for_timeout(400)
+            if abs(frame() - target) > 1:
+                self.trouble(f"{name}: the slider does not scrub (at {frame()}, asked {target})")
+            pictures.append(self._picture(player))
+        if pictures[0] == pictures[1]:
+            self.trouble(f"{name} shows the same picture wherever its slider stands")
+
+    def _play(self, player, on: bool) -> None:
+        button = player.get_by_role("button", name="Play" if on else "Pause", exact=True)
+        if button.count():
+            button.first.click()
+
+    def _picture(self, player) -> bytes:
+        return player.locator("canvas").first.screenshot()
+
+
+@contextmanager
+def local_server(folder: Path):
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def log_message(self, *args):
+            pass
+
+    class Server(http.server.ThreadingHTTPServer):
+        def handle_error(self, request, client_address):
+            pass  # the browser left while a page was on its way
+
+    with Server(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder))) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()
+
+
+def chromium() -> str:
+    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    if not found:
+        sys.exit(
+            "No Chromium found. Install it (Debian: apt-get install chromium) or set CHROMIUM."
+        )
+    return found
+
+
+def check_search(window: BrowserContext, base: str) -> list[str]:
+    """The search page finds a page of the book."""
+    visit = Visit(window, f"{base}search.html?q=rotation")
+    try:
+        visit.page.wait_for_selector("#search-results li a", timeout=PATIENCE)
+    except TimeoutError:
+        visit.trouble("search finds nothing for 'rotation'")
+    visit.page.wait_for_timeout(500)
+    visit.page.close()
+    return visit.troubles
+
+
+def check_page(window: BrowserContext, base: str, path: Path, folder: Path) -> list[str]:
+    visit = Visit(window, base + path.relative_to(folder).as_posix())
+    visit.check_math()
+    visit.check_width()
+    if visit.page.viewport_size["width"] == DESKTOP[0]:
+        visit.check_players()
+    weight = own_weight(visit.loaded, base, folder)
+    if weight > PAGE_BYTES:
+        visit.trouble(f"weighs {weight / 1e6:.1f} MB, allowed {PAGE_BYTES / 1e6} MB")
+    visit.page.close()
+    return visit.troubles
+
+
+def own_weight(loaded: set[str], base: str, folder: Path) -> int:
+    """Bytes of the files that a page loads beyond the ones all pages share (_static)."""
+    paths = {url.removeprefix(base) for url in loaded if url.startswith(base)}
+    own = [folder / path for path in paths if not path.startswith(("_static/", "searchindex"))]
+    return sum(path.stat().st_size for path in own if path.is_file())
+
+
+def check(folder: Path) -> list[str]:
+    """All troubles of the book in this folder, one line each."""
+    troubles = []
+    pages = sorted(p for p in folder.rglob("*.html") if "_static" not in p.parts)
+    with local_server(folder) as server, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
+        for base, (width, height) in product((folder.as_uri() + "/", server), (DESKTOP, PHONE)):
+            window = browser.new_context(viewport={"width": width, "height": height})
+            where = f"{base.split(':')[0]}, {width} px"
+            troubles += [f"{where}: search: {t}" for t in check_search(window, base)]
+            # Listings of source code are all alike: the narrow window, from disk, is enough.
+            listings = base.startswith("file:") and width == PHONE[0]
+            opened = [p for p in pages if listings or "_modules" not in p.parts]
+            for path in opened:
+                found = check_page(window, base, path, folder)
+                troubles += [f"{where}: {path.relative_to(folder)}: {t}" for t in found]
+            print(f"{where}: {len(opened)} pages opened", flush=True)
+            window.close()
+        browser.close()
+    return troubles
+
+
+def main() -> None:
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "book/_build/html").resolve()
+    if not (folder / "index.html").exists():
+        sys.exit(f"{folder} holds no built book; run `make book` first.")
+    troubles = check(folder)
+    for trouble in troubles:
+        print("TROUBLE", trouble)
+    print(f"{len(troubles)} troubles")
+    sys.exit(1 if troubles else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,47 @@
+"""The browser check must find what it is there to find: each fault is planted in a tiny book."""
+
+import pytest
+
+check_book = pytest.importorskip("check_book", exc_type=ImportError)
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+FAULTS = {
+    "asks for": '<img src="http://example.invalid/a.png">',
+    "console: broken": "<script>console.error('broken')</script>",
+    "script: ": "<script>undefinedFunction()</script>",
+    "scrolls sideways": '<div style="width: 800px">wide</div>',
+    "weighs": f"<!-- {'x' * 2_600_000} -->",
+    "none drawn": '<span class="math">\\(x\\)</span>',
+    "did not start": '<figure class="motionlab-player"></figure>',
+    "does not move": (
+        '<figure class="motionlab-player"><canvas></canvas><button>Play</button>'
+        '<input type="range" max="100"></figure>'
+    ),
+}
+SEARCH = '<div id="search-results"><li><a href="index.html">found</a></li></div>'
+
+
+@pytest.fixture(scope="module")
+def troubles(tmp_path_factory):
+    try:
+        check_book.chromium()
+    except SystemExit as missing:
+        pytest.skip(str(missing))
+    folder = tmp_path_factory.mktemp("book")
+    pages = {f"fault{i}": body for i, body in enumerate(FAULTS.values())}
+    for name, body in (pages | {"index": "<p>fine</p>", "search": SEARCH}).items():
+        html = f"<!doctype html><link rel=icon href=data:,><title>{name}</title>{body}"
+        (folder / f"{name}.html").write_text(html, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(check_book, "PATIENCE", 1_500)  # nothing here will ever appear
+        return check_book.check(folder)
+
+
+@pytest.mark.parametrize("number, expected", list(enumerate(FAULTS)))
+def test_planted_fault_is_found(troubles, number, expected):
+    assert any(f"fault{number}.html" in line and expected in line for line in troubles), troubles
+
+
+def test_good_pages_pass(troubles):
+    assert not [line for line in troubles if "index.html" in line or "search" in line]
