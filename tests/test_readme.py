@@ -1,0 +1,68 @@
+"""The README's commands and example do what it says."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_example_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (example,) = blocks("python")
+    names = {}
+    exec(compile(example, "README.md", "exec"), names)
+    out = capsys.readouterr().out
+    assert "300 frames, 10.00 s, 30 fps" in out
+    travelled = float(re.search(r"travel ([\d.]+) m", out)[1])
+    assert travelled == pytest.approx(14, rel=0.05)  # 10 s at 1.4 m/s
+    import motionlab as ml
+
+    written = ml.read_bvh("walk.bvh")
+    assert written.fps == 60
+    assert (written.positions()[::2] - names["mirrored"].positions()).abs().max() < 1e-4
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="no make on this machine")
+def test_make_knows_the_commands():
+    targets = re.findall(r"^make (\w+)", "\n".join(blocks("sh")), re.MULTILINE)
+    assert targets == ["book", "test"]
+    for target in targets:
+        run = subprocess.run(["make", "-n", target], cwd=ROOT, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
+
+
+def test_the_data_commands_run(tmp_path):
+    commands = re.findall(r"^python -m (motionlab .*?)(?:\s+#.*)?$", README, re.MULTILINE)
+    assert commands == ["motionlab data list", "motionlab data fetch accad"]
+    env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    listing = subprocess.run(
+        [sys.executable, "-m", *commands[0].split()], env=env, capture_output=True, text=True
+    )
+    assert listing.returncode == 0, listing.stderr
+    assert "accad" in listing.stdout and "CC BY 3.0" in listing.stdout
+    # fetching needs a network; without a terminal it asks for --yes and fetches nothing
+    fetch = subprocess.run(
+        [sys.executable, "-m", *commands[1].split()],
+        env={k: v for k, v in env.items() if k != "MOTIONLAB_DATA"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert "CC BY 3.0" in fetch.stdout + fetch.stderr
+    assert "Traceback" not in fetch.stderr
+
+
+def test_what_the_readme_links_to_is_there():
+    for target in re.findall(r"\]\(([^)#:]+)\)", README):
+        assert (ROOT / target).exists(), target
