@@ -101,3 +101,12 @@ def test_inputs_are_left_alone():
     positions.zero_(), orientations.zero_()
     for name, value in body.items():
         assert torch.equal(torch.as_tensor(value), before[name]), name
+
+
+def test_sampling_first_does_not_spoil_training():
+    body = random_body(3, (2,), 7, ends=0)  # a tree that no other test has cached
+    with torch.inference_mode():
+        forward_kinematics(**body)
+    body["rotations"] = body["rotations"].clone().requires_grad_()
+    forward_kinematics(**body)[0].sum().backward()
+    assert body["rotations"].grad.abs().sum() > 0

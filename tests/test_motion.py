@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -249,6 +251,32 @@ def test_numpy_in_and_out():
     assert same(again, motion) and root.dtype == np.float32
 
 
+def test_joining_says_where_skeletons_differ():
+    motion = lopsided()
+    offsets = motion.skeleton.offsets.clone()
+    offsets[0] += 1.0  # the root's does not matter
+    offsets[4, 1] += 0.034
+    names = ("base", *motion.skeleton.names[1:])
+    for change, words in (
+        (dict(offsets=offsets), f"offsets of '{motion.skeleton.names[4]}' differ by 3.4 cm"),
+        (dict(names=names), f"joint 0 is called '{motion.skeleton.names[0]}' and 'base'"),
+        (dict(end_parents=(5, 2, 6)), "end sites hang together"),
+    ):
+        other = dataclasses.replace(motion, skeleton=dataclasses.replace(motion.skeleton, **change))
+        with pytest.raises(MotionError, match=words):
+            concatenate([motion, motion, other])
+    with pytest.raises(MotionError, match="7 and 21 joints"):
+        motion + wander()
+    with pytest.raises(MotionError, match="differ by .* cm"):
+        concatenate([motion, motion.mirror()])
+
+
+@pytest.mark.parametrize("given", [wander(), 3, None])
+def test_joining_what_is_no_list(given):
+    with pytest.raises(MotionError, match="takes a list of motions"):
+        concatenate(given)
+
+
 # -- immutability -------------------------------------------------------------------------------
 
 
@@ -278,3 +306,17 @@ def test_gradients_reach_the_pose():
     posed.mirror().resample(20).positions()[..., 1].sum().backward()
     assert rotations.grad.abs().sum() > 0 and torch.isfinite(rotations.grad).all()
     assert repr(posed) and posed.numpy()[1].shape == (12, 21, 3, 3)
+
+
+def test_a_motion_does_not_change_with_the_array_it_was_made_of():
+    root = np.zeros((2, 3), np.float32)
+    skeleton = Skeleton(("a",), (-1,), torch.zeros(1, 3))
+    motion = Motion(skeleton, root, np.tile(np.eye(3, dtype=np.float32), (2, 1, 1, 1)), 30)
+    root += 5
+    assert motion.root_positions.abs().max() == 0
+
+
+def test_tab_completion_finds_what_is_imported_late():
+    code = "import motionlab, sys; print(*dir(motionlab)); assert 'pyvista' not in sys.modules"
+    found = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert {"show", "datasets", "viewer", "Motion", "__version__"} <= set(found.stdout.split())

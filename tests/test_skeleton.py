@@ -179,3 +179,8 @@ def test_refused(change, words):
 def test_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError):
         Skeleton.canonical().names = ("a",)
+
+
+def test_capital_names_that_start_with_r_or_l_are_not_sides():
+    skeleton = Skeleton(("ROOT", "SPINE", "LThigh"), (-1, 0, 0), torch.rand(3, 3))
+    assert skeleton.roles == {"hips": 0, "spine": 1, "left_upper_leg": 2}

@@ -22,6 +22,10 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})  # tab completion finds what is not imported yet
+
+
 def __getattr__(name: str):
     # Data sets and pictures are imported when first used: reading a clip needs neither.
     if name in ("datasets", "viewer"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -66,15 +67,15 @@ class Fetch:
             f"\n{len(absent)} of {len(clips)} clips, {sum(c.bytes for c in absent) / 1e6:.1f} MB, "
             f"to {files.cache_folder()}"
         )
-        if not self.yes and not _confirmed():
-            raise MotionLabError("Nothing was downloaded; confirm with y, or pass --yes.")
+        if not self.yes:
+            _confirm()
         files.fetch(absent, self.name)
         print(f"{self.name}: {len(absent)} clips downloaded and checked.")
 
 
 @dataclass
 class Verify:
-    """Check every file against its SHA-256."""
+    """Check every file against its SHA-256. Fails if one is wrong, or absent from a named set."""
 
     name: Positional[Annotated[str | None, arg(metavar="[NAME]")]] = None
     """Data set; all of them if left out."""
@@ -89,19 +90,28 @@ class Verify:
             return
         clips = registry.members(self.name) if self.name else list(registry.clips())
         bar = tqdm(total=len(clips), desc="checking", unit="clip", leave=False, delay=1)
-        found = []
+        found = {}
         with bar:
-            for _, fault in files.verify(clips):
-                found.append(fault)
+            for clip, fault in files.verify(clips):
+                found[clip] = fault
                 bar.update()
-        bad = [fault for fault in found if fault]
+        faults = [fault for fault in found.values() if fault]
+        absent = Counter(clip.source for clip in clips if clip not in found)
         what = self.name or "all data sets"
         print(
-            f"{what}: {len(found) - len(bad)} of {len(clips)} clips right, {len(bad)} wrong, "
-            f"{len(clips) - len(found)} absent"
+            f"{what}: {len(found) - len(faults)} of {len(clips)} clips right, {len(faults)} wrong, "
+            f"{absent.total()} absent"
         )
-        if bad:
-            raise MotionLabError("\n".join(bad))
+        if absent:
+            print("absent: " + ", ".join(f"{count} of {name}" for name, count in absent.items()))
+        if absent and (self.name or not found):
+            faults.append(
+                f"{absent.total()} clips are not on this machine; let MOTIONLAB_DATA name the "
+                f"folder that holds them, or run `python -m motionlab data fetch "
+                f"{self.name or next(iter(absent))}`."
+            )
+        if faults:
+            raise MotionLabError("\n".join(faults))
 
 
 @dataclass
@@ -136,10 +146,11 @@ class Version:
 COMMANDS = Annotated[Data, subcommand("data")] | Annotated[Version, subcommand("version")]
 
 
-def _confirmed() -> bool:
-    if not sys.stdin.isatty():
-        return False
-    return input("Download? [y/N] ").strip().lower() in ("y", "yes")
+def _confirm() -> None:
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise MotionLabError("Nothing was downloaded; not a terminal: pass --yes.")
+    if input("Download? [y/N] ").strip().lower() not in ("y", "yes"):
+        raise MotionLabError("Nothing was downloaded; confirm with y, or pass --yes.")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -78,15 +78,15 @@ def _levels(
             members.append([])
         place.append(len(members[depth[joint]]))
         members[depth[joint]].append(joint)
-    levels = [
-        (
-            torch.tensor(level, device=device),
-            torch.tensor([place[parents[joint]] for joint in level], device=device),
-        )
-        for level in members[1:]
-    ]
-    flat = torch.tensor([joint for level in members for joint in level], device=device)
-    return levels, flat.argsort()
+    flat = [joint for level in members for joint in level]
+    above = [[place[parents[joint]] for joint in level] for level in members[1:]]
+    # Kept for later calls: made while sampling, they must serve when training.
+    with torch.inference_mode(False):
+        levels = [
+            (torch.tensor(level, device=device), torch.tensor(rows, device=device))
+            for level, rows in zip(members[1:], above, strict=True)
+        ]
+        return levels, torch.tensor(flat, device=device).argsort()
 
 
 def _product(a: Tensor, b: Tensor) -> Tensor:

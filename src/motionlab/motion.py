@@ -81,7 +81,10 @@ class Motion:
     def _tensor(self, field: str, dtype: torch.dtype) -> Tensor:
         """Keep a field as a tensor."""
         try:
-            tensor = torch.as_tensor(getattr(self, field), dtype=dtype)
+            value = getattr(self, field)
+            # an array is copied: its owner may go on writing to it
+            keep = torch.as_tensor if isinstance(value, Tensor) else torch.tensor
+            tensor = keep(value, dtype=dtype)
         except (TypeError, ValueError, RuntimeError) as error:
             raise MotionError(f"{self._label}: {field} must be an array: {error}.") from error
         object.__setattr__(self, field, tensor)
@@ -238,6 +241,10 @@ def concatenate(motions: Iterable[Motion]) -> Motion:
     ------
     MotionError : there is none, or they differ in skeleton or frame rate.
     """
+    if isinstance(motions, Motion) or not isinstance(motions, Iterable):
+        raise MotionError(
+            f"concatenate takes a list of motions, as concatenate([a, b]), not {motions!r}."
+        )
     motions = list(motions)
     if not motions:
         raise MotionError("Nothing to concatenate: the list of motions is empty.")
@@ -245,10 +252,11 @@ def concatenate(motions: Iterable[Motion]) -> Motion:
         if not isinstance(motion, Motion):
             raise MotionError(f"Only motions can be concatenated, not {motion!r}.")
     first = motions[0]
-    for other in motions[1:]:
+    for number, other in enumerate(motions[1:], 1):
         if not first.skeleton.matches(other.skeleton):
             raise MotionError(
-                f"{first!r} and {other!r} have different skeletons; "
+                f"Motions 0 and {number}, {first!r} and {other!r}, have different skeletons: "
+                f"{first.skeleton.difference(other.skeleton)}; "
                 "bring them to one skeleton before joining them."
             )
         if abs(first.fps - other.fps) > _RATE_TOLERANCE * first.fps:

@@ -137,6 +137,21 @@ class Skeleton:
             and torch.allclose(self.end_offsets, other.end_offsets, rtol=0, atol=tolerance)
         )
 
+    def difference(self, other: Skeleton) -> str:
+        """In words, where a skeleton that does not match this one differs most plainly."""
+        if self.joints != other.joints:
+            return f"{self.joints} and {other.joints} joints"
+        for joint, names in enumerate(zip(self.names, other.names, strict=True)):
+            if names[0] != names[1]:
+                return f"joint {joint} is called {names[0]!r} and {names[1]!r}"
+        if self.point_parents != other.point_parents:
+            return "the joints and end sites hang together in different ways"
+        gaps = torch.cat([self.offsets - other.offsets, self.end_offsets - other.end_offsets])
+        gaps = gaps.norm(dim=-1)
+        gaps[0] = 0  # the root's offset is for reference only
+        most = int(gaps.argmax())
+        return f"the offsets of {self.point_names[most]!r} differ by {100 * gaps[most]:.2g} cm"
+
     # -- meaning ------------------------------------------------------------------------------
 
     @cached_property
@@ -267,6 +282,9 @@ _ROLE_OF = {
 def _split_side(name: str) -> tuple[str | None, str]:
     """("left", "upleg") from LeftUpLeg, lUpLeg, UpLeg_L, mixamorig:LeftUpLeg; (None, ...) else."""
     name = name.rsplit(":", 1)[-1]
+    letters = re.sub(r"[^a-z0-9]", "", name.lower())
+    if (False, letters) in _ROLE_OF:  # ROOT is no right "oot"
+        return None, letters
     for side in SIDES:
         initial = side[0]
         patterns = (
@@ -279,7 +297,7 @@ def _split_side(name: str) -> tuple[str | None, str]:
             match = re.match(pattern, name, re.IGNORECASE if i < 2 else 0)
             if match:
                 return side, re.sub(r"[^a-z0-9]", "", match[1].lower())
-    return None, re.sub(r"[^a-z0-9]", "", name.lower())
+    return None, letters
 
 
 def _role(name: str) -> str | None:
@@ -325,10 +343,11 @@ _CANONICAL_TIPS = (
 @cache
 def _canonical() -> Skeleton:
     names = [name for name, *_ in _CANONICAL]
-    return Skeleton(
-        tuple(names),
-        tuple(names.index(parent) if parent else -1 for _, parent, _ in _CANONICAL),
-        torch.tensor([offset for *_, offset in _CANONICAL]),
-        tuple(names.index(name) for name, _ in _CANONICAL_TIPS),
-        torch.tensor([offset for _, offset in _CANONICAL_TIPS]),
-    )
+    with torch.inference_mode(False):  # kept for later calls, which may need gradients
+        return Skeleton(
+            tuple(names),
+            tuple(names.index(parent) if parent else -1 for _, parent, _ in _CANONICAL),
+            torch.tensor([offset for *_, offset in _CANONICAL]),
+            tuple(names.index(name) for name, _ in _CANONICAL_TIPS),
+            torch.tensor([offset for _, offset in _CANONICAL_TIPS]),
+        )

@@ -39,7 +39,8 @@ def test_fetch_does_not_download_unconfirmed(tmp_path):
     done = run("data", "fetch", "accad", MOTIONLAB_DATA="", XDG_CACHE_HOME=str(tmp_path))
     assert done.returncode == 1
     assert "CC BY 3.0" in done.stdout and "7.4 MB" in done.stdout
-    assert "--yes" in done.stderr and "Traceback" not in done.stderr
+    assert "not a terminal: pass --yes" in done.stderr and "Traceback" not in done.stderr
+    assert "confirm with y" not in done.stderr
 
 
 @pytest.mark.parametrize("arguments", [[], ["data"], ["data", "fetch"], ["dance"]])
@@ -66,14 +67,31 @@ def test_gaits_have_no_files(capsys):
 
 def test_fetch_and_verify(toy, capsys):
     toy.serve()
-    assert main(["data", "verify", "toy"]) == 0
-    assert "0 of 3 clips right, 0 wrong, 3 absent" in capsys.readouterr().out
+    assert main(["data", "verify", "toy"]) == 1
+    printed = capsys.readouterr()
+    assert "0 of 3 clips right, 0 wrong, 3 absent" in printed.out
+    assert "MOTIONLAB_DATA" in printed.err and "data fetch toy" in printed.err
     assert main(["data", "fetch", "toy", "--yes"]) == 0
     assert "CC BY-NC 4.0 (non-commercial)" in capsys.readouterr().out
     assert main(["data", "fetch", "toy"]) == 0
     assert "all 3 clips are at hand" in capsys.readouterr().out
     assert main(["data", "verify"]) == 0
     assert "3 of 3 clips right" in capsys.readouterr().out
+
+
+def test_verify_of_everything_bears_absent_clips_unless_all_are(toy, capsys):
+    toy.serve()
+    assert main(["data", "verify"]) == 1
+    assert "absent: 3 of toy" in capsys.readouterr().out
+    main(["data", "fetch", "toy", "--yes"])
+    wrong = toy.cache / "clips/toy/toy/02.bvh"
+    wrong.unlink()
+    capsys.readouterr()
+    assert main(["data", "verify"]) == 0
+    assert "2 of 3 clips right, 0 wrong, 1 absent\nabsent: 1 of toy" in capsys.readouterr().out
+    assert main(["data", "verify", "toy"]) == 1
+    wrong.write_bytes(b"rot")
+    assert main(["data", "verify"]) == 1
 
 
 def test_fetch_mends_what_verify_finds(toy, capsys):

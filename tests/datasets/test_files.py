@@ -78,8 +78,14 @@ def test_a_download_that_goes_wrong(toy, served, reason):
 def test_no_network(toy, monkeypatch):
     toy.server.shutdown()
     toy.server.server_close()
-    with pytest.raises(DataError, match=r"(?s)failed \(.*MOTIONLAB_DATA=.*load\('gaits'\)"):
+    offline_first = (
+        r"(?s)failed \(127\.0\.0\.1 does not answer: no network\?\)"
+        r".*MOTIONLAB_DATA=.*load\('gaits'\).*data fetch toy +tries again"
+    )
+    with pytest.raises(DataError, match=offline_first) as caught:
         datasets.load("toy")
+    assert "HTTPConnection" not in str(caught.value)
+    assert toy.server.url + "toy/" in str(caught.value)
     assert downloaded(toy) == []
 
 

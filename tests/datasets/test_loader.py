@@ -248,6 +248,8 @@ def test_from_folder_that_is_empty_or_absent(tmp_path):
         datasets.from_folder(tmp_path / "empty")
     with pytest.raises(DataError, match="is not a folder"):
         datasets.from_folder(tmp_path / "absent")
+    with pytest.raises(DataError, match="None is not a path"):
+        datasets.from_folder(None)
 
 
 # -- the real clips -------------------------------------------------------------------------------
@@ -267,3 +269,7 @@ def test_real_examples(tmp_path, monkeypatch):
         # no frame jumps: T-poses and what surrounds them are gone
         speed = (points[1:] - points[:-1]).norm(dim=-1).amax(-1) * motion.fps
         assert speed[:5].amax() < 15, motion
+
+
+def test_wanted_clips_may_come_from_a_generator():
+    assert [m.name for m in datasets.load("gaits", clips=(n for n in ["stand"]))] == ["stand"]

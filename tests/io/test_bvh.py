@@ -113,6 +113,14 @@ def test_position_channels_of_the_first_inner_joint_move_the_body():
         np.testing.assert_allclose(motion.positions()[frame].numpy(), expected, atol=1e-6)
 
 
+def test_one_frame_is_folded_as_the_whole_clip_is():
+    text = corpus.six_channels([(5, 30, -4)] * 3)
+    text = text.replace("ROOT Hips", "ROOT World").replace("Chest", "Hips")
+    text = "\n".join(text.replace("Frames: 3", "Frames: 1").rstrip().split("\n")[:-2])
+    assert len(parse_bvh(text.encode(), "one.bvh")) == 1
+    assert parse_bvh(text.encode(), "one.bvh").skeleton.names == ("Hips", "LeftArm", "RightArm")
+
+
 @pytest.mark.parametrize(
     "letters, encoding",
     [
@@ -326,3 +334,10 @@ def test_real_clips_survive_writing(real_clips, tmp_path):
                 )
                 expected = theirs.node_positions()[:300, nodes] * units
                 np.testing.assert_allclose(motion.positions().numpy(), expected, atol=1e-5)
+
+
+def test_writing_with_the_arguments_swapped(tmp_path):
+    for arguments in ((tmp_path / "e.bvh", plain()), ("x", tmp_path / "y.bvh"), (plain(), None)):
+        with pytest.raises(BvhError, match="the motion first, then the path"):
+            write_bvh(*arguments)
+    assert not list(tmp_path.iterdir())

@@ -45,6 +45,12 @@ def test_paths_that_are_no_files(tmp_path):
             read_bvh(path)
 
 
+@pytest.mark.parametrize("path", [None, 3, ["a.bvh"]])
+def test_what_is_no_path(path):
+    with pytest.raises(BvhError, match="is not a path"):
+        read_bvh(path)
+
+
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root reads all files")
 def test_file_without_read_permission(tmp_path):
     path = tmp_path / "clip.bvh"

@@ -17,8 +17,9 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Self
+from urllib.parse import urlsplit
 
-from tqdm.auto import tqdm
+from tqdm import tqdm
 
 from ..errors import DataError
 from .registry import Clip, sources
@@ -179,17 +180,29 @@ def get(name: str, clips: Sequence[Clip], download: bool | None = None) -> None:
         raise DataError(_absent(name, absent, len(clips), "they are not downloaded unasked"))
 
 
-def _absent(name: str, absent: Sequence[Clip], wanted: int, reason: str) -> str:
+def _absent(
+    name: str, absent: Sequence[Clip], wanted: int, reason: str, failed: bool = False
+) -> str:
+    """What is missing, why, and what helps; a download that has `failed` is the last advice."""
     size = sum(clip.bytes for clip in absent) / 1e6
     first = absent[0]
     folder = os.environ.get("MOTIONLAB_DATA")
     looked = f"MOTIONLAB_DATA={folder}" if folder else "MOTIONLAB_DATA is not set"
-    return (
-        f"{len(absent)} of {wanted} clips of {name!r} are not on this machine ({looked}), such as "
-        f"{first.path}; {reason}. Any of these helps:\n"
-        f"  python -m motionlab data fetch {name}    downloads {size:.1f} MB, such as {first.url}\n"
-        f"  MOTIONLAB_DATA=folder    with {first.source}.zip or {first.source}/{first.path} in it\n"
-        "  motionlab.datasets.load('gaits')    needs neither files nor network"
+    command = f"  python -m motionlab data fetch {name}    "
+    offline = [
+        f"  MOTIONLAB_DATA=folder    with {first.source}.zip or {first.source}/{first.path} in it",
+        "  motionlab.datasets.load('gaits')    needs neither files nor network",
+    ]
+    if failed:
+        ways = [*offline, f"{command}tries again, {size:.1f} MB, once there is a network"]
+    else:
+        ways = [f"{command}downloads {size:.1f} MB, such as {first.url}", *offline]
+    return "\n".join(
+        [
+            f"{len(absent)} of {wanted} clips of {name!r} are not on this machine ({looked}), such "
+            f"as {first.path}; {reason}. Any of these helps:",
+            *ways,
+        ]
     )
 
 
@@ -217,7 +230,7 @@ def fetch(clips: Sequence[Clip], name: str, quiet: bool = False) -> None:
             except Exception as error:  # requests, urllib3, pooch and the disk each have their own
                 left = [clip, *(c for c in clips if c is not clip)][: len(clips) - done]
                 reason = f"downloading {clip.url} failed ({_in_short(error, clip)})"
-                raise DataError(_absent(name, left, len(clips), reason)) from error
+                raise DataError(_absent(name, left, len(clips), reason, failed=True)) from error
             done += 1
             bar.update(clip.bytes)
     finally:
@@ -242,6 +255,11 @@ def _fetch_one(clip: Clip) -> None:
 
 
 def _in_short(error: BaseException, clip: Clip) -> str:
+    import requests
+
+    silent = isinstance(error, requests.ConnectionError | requests.Timeout)
+    if silent and not isinstance(error, requests.exceptions.SSLError):
+        return f"{urlsplit(clip.url).hostname} does not answer: no network?"
     if isinstance(error, ValueError) and "hash" in str(error).lower():
         return f"what came has another SHA-256 than {clip.sha256}"
     # requests wraps urllib3's error, which wraps the one that says what happened

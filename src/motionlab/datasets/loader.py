@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import torch
-from tqdm.auto import tqdm
+from tqdm import tqdm
 
 from ..errors import BvhError, DataError
 from ..io.bvh import parse_bvh, read_bvh
@@ -108,8 +108,8 @@ def _gaits(split: str | None, clips: Sequence[str] | None) -> list[Motion]:
     motions = gaits.load(split)
     if clips is None:
         return motions
-    check_wanted(clips, [motion.name for motion in gaits.load()], GAITS)
-    return [motion for motion in motions if motion.name in clips]
+    wanted = check_wanted(clips, [motion.name for motion in gaits.load()], GAITS)
+    return [motion for motion in motions if motion.name in wanted]
 
 
 @_one_thread()
@@ -143,11 +143,18 @@ def from_folder(
     DataError : there is no such folder or no such file in it, or files that can't be read; the
         message names all of them.
     """
-    folder = Path(path).expanduser()
     check_split(split)
+    if not isinstance(path, str | os.PathLike):
+        raise DataError(f"from_folder: {path!r} is not a path; give the folder of the BVH files.")
+    folder = Path(path).expanduser()
     if not folder.is_dir():
         raise DataError(f"{folder}: is not a folder; give the folder that holds the BVH files.")
-    found = sorted(file for file in folder.glob(pattern) if file.is_file())
+    try:
+        found = sorted(file for file in folder.glob(pattern) if file.is_file())
+    except (ValueError, NotImplementedError) as error:
+        raise DataError(
+            f"{folder}: {pattern!r} is no pattern below the folder; write one like '**/*.bvh'."
+        ) from error
     if not found:
         raise DataError(
             f"{folder}: no file matches {pattern!r}; put BVH files there, or give another pattern."

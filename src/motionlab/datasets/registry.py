@@ -154,22 +154,24 @@ def choose(name: str, split: str | None = None, wanted: Sequence[str] | None = N
     check_split(split)
     found = members(name)
     if wanted is not None:
-        check_wanted(wanted, [clip.name for clip in found], name)
-        found = [clip for clip in found if clip.name in set(wanted)]
+        chosen = check_wanted(wanted, [clip.name for clip in found], name)
+        found = [clip for clip in found if clip.name in chosen]
     return [clip for clip in found if split in (None, clip.split)]
 
 
-def check_wanted(wanted: Sequence[str], known: Iterable[str], name: str) -> None:
+def check_wanted(wanted: Iterable[str], known: Iterable[str], name: str) -> set[str]:
+    """The wanted names as a set, all of them known."""
     if isinstance(wanted, str):
         raise DataError(f"clips={wanted!r} must be a list of names: clips=[{wanted!r}].")
-    known = list(known)
-    for clip in wanted:
+    wanted, known = set(wanted), list(known)
+    for clip in sorted(wanted):
         if clip not in known:
             near = get_close_matches(clip, known, 3, 0.3) or known[:3]
             raise DataError(
                 f"Data set {name!r} has no clip {clip!r}; did you mean {', '.join(near)}? "
                 f"motionlab.datasets.table({name!r}) lists all {len(known)}."
             )
+    return wanted
 
 
 @dataclass(frozen=True, repr=False)

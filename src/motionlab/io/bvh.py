@@ -66,6 +66,8 @@ def read_bvh(
     ------
     BvhError : the file can't be read; the message names file, line and remedy.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise BvhError(f"read_bvh: {path!r} is not a path; give the file to read.")
     path = Path(path)
     try:
         data = path.read_bytes()
@@ -128,6 +130,11 @@ def write_bvh(
     ------
     BvhError : the motion has no frames, or the path can't be written.
     """
+    if not isinstance(motion, Motion) or not isinstance(path, str | os.PathLike):
+        raise BvhError(
+            f"write_bvh: got {motion!r} and {path!r}; give the motion first, then the path, as in "
+            "write_bvh(motion, 'walk.bvh')."
+        )
     path = Path(path)
     scale = 1 / _metres(units)
     if len(motion) == 0:
@@ -187,7 +194,10 @@ def _positive(fps: float, where) -> float:
 
 
 def _is_positive(value) -> bool:
-    return isinstance(value, Real) and math.isfinite(value) and value > 0
+    try:
+        return isinstance(value, Real) and math.isfinite(value) and value > 0
+    except OverflowError:  # an integer beyond every float
+        return False
 
 
 def _rate(layout: Layout) -> float:
@@ -244,10 +254,16 @@ def _assemble(
     rotations = from_euler(angles, orders)
     root = shifts.get(0, np.tile(offsets[0], (len(angles), 1)))
 
-    # A root that only carries one moving joint is folded into it: its pose times the joint's.
+    # A root that only carries one joint, which is not where its OFFSET says, is folded into it:
+    # its pose times the joint's. (Compared with the OFFSET so that one frame tells, too.)
     children = np.bincount([parent + 1 for parent in parents + end_parents])
     first, turn = 0, rotations[:, 0].astype(np.float64)
-    while first + 1 < len(names) and children[first + 1] == 1 and _moves(shifts.get(first + 1)):
+    while (
+        first + 1 < len(names)
+        and children[first + 1] == 1
+        and first + 1 in shifts
+        and np.abs(shifts[first + 1] - offsets[first + 1]).max() > RIGID
+    ):
         first += 1
         root = root + (turn @ shifts[first][..., None])[..., 0]
         turn = turn @ rotations[:, first]
@@ -273,10 +289,6 @@ def _assemble(
         tuple(orders[first:]),
     )
     return Motion(skeleton, root, rotations, fps, name=Path(where).stem, source=source)
-
-
-def _moves(shift: np.ndarray | None) -> bool:
-    return shift is not None and bool(np.ptp(shift, axis=0).max() > RIGID)
 
 
 # -- writing ------------------------------------------------------------------------------------
