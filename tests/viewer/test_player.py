@@ -222,10 +222,12 @@ POINTS = standing(5).positions()
         ((([standing(), standing(fps=60.0)],), {}), "different rates"),
         ((([standing(), standing()],), {"labels": ["one"]}), "1 labels for 2 motions"),
         ((([standing(), standing()],), {"colors": "red"}), "1 colors for 2 motions"),
-        (((standing(),), {"colors": "no such colour"}), "no such colour"),
+        (((standing(),), {"colors": "no such colour"}), "^colors: 'no such colour'"),
         (((standing(),), {"contacts": True}), "no motion has contact labels"),
         (((standing(30),), {"contacts": torch.ones(30, 2)}), r"\(30, 4\)"),
         (((standing(),), {"paths": [1.0, 2.0]}), "path 0"),
+        (((standing(),), {"paths": "x"}), r"paths is a str .*\(n, 2\)"),
+        (((standing(),), {"paths": [[[0, 0], [1]]]}), "paths is a list"),
         (((standing(),), {"trail": "tail"}), "tail"),
         (((standing(),), {"trail": 99}), "26 points"),
         (((standing(),), {"height": 5}), "pixels"),
@@ -236,6 +238,14 @@ def test_bad_arguments_say_what_and_what_to_do(arguments, says):
     positional, named = arguments
     with pytest.raises(MotionLabError, match=says):
         show(*positional, **named)
+
+
+def test_a_player_says_what_it_plays():
+    one = show(standing(30, 29.97))
+    two = show([standing(30), standing(183)])
+    assert repr(one) == "Player(1 motion, 30 frames, 29.97 fps)"
+    assert repr(two) == "Player(2 motions, 183 frames, 30 fps)"
+    one.close(), two.close()
 
 
 def test_lists_labels_paths_and_trails_arrive():

@@ -1,10 +1,13 @@
 import matplotlib
 import numpy as np
 import pytest
+import torch
 
 matplotlib.use("agg")
 
+from motionlab import Motion  # noqa: E402
 from motionlab.datasets import gaits  # noqa: E402
+from motionlab.errors import ViewerError  # noqa: E402
 from motionlab.viewer import plots  # noqa: E402
 
 
@@ -46,3 +49,33 @@ def test_feet_draws_a_bar_for_every_exact_contact(walk):
     runs = int(toes[0].sum() + (toes.diff(dim=0) == 1).sum())
     assert drawn >= runs > 2
     assert len(height.lines) == 2 and len(speed.lines) == 3
+
+
+def test_a_path_is_named_where_it_is_farthest_from_the_start(walk):
+    there = walk.root_positions
+    back = Motion(
+        walk.skeleton, torch.cat([there, there.flip(0)]), walk.rotations.repeat(2, 1, 1, 1), 30
+    )
+    axes, *_ = plots.root_paths([back], "there and back").axes
+    (note,) = axes.texts
+    far = (there - there[0])[:, [0, 2]].norm(dim=-1).max()
+    assert note.get_text() == "there and back"
+    assert np.linalg.norm(note.xy) == pytest.approx(float(far), rel=1e-5) and far > 2
+
+
+@pytest.mark.parametrize(
+    "call, message",
+    [
+        (lambda m: plots.joint_map(m, frame=9999), "frame 9999 is not in this motion of 90"),
+        (lambda m: plots.joint_map([m]), "needs a Motion"),
+        (lambda m: plots.bars([1, 2], ["a"], "x"), "1 names for values"),
+        (lambda m: plots.root_paths([m, m], labels=["a"]), "1 labels for 2 motions"),
+        (lambda m: plots.root_paths(m), r"root_paths\(\[motion\]\)"),
+        (lambda m: plots.root_paths([]), "list of motions"),
+        (lambda m: plots.root_paths([m[:1]]), "2 frames or more"),
+        (lambda m: plots.feet(m[:1]), "2 frames or more"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said(walk, call, message):
+    with pytest.raises(ViewerError, match=message):
+        call(walk)

@@ -8,6 +8,7 @@ from PIL import Image
 from scipy.ndimage import label
 
 from motionlab import Motion, MotionLabError, Skeleton
+from motionlab.errors import ViewerError
 from motionlab.viewer import filmstrip, still, video
 from motionlab.viewer import probe as probe_
 from motionlab.viewer.picture import Camera, Figure, Floor, Picture, capsules, unit
@@ -143,7 +144,7 @@ def test_contacts_ring_the_feet():
     )
     redder = (ringed[..., 0] - ringed[..., 2] > 80) & ~(plain[..., 0] - plain[..., 2] > 80)
     assert redder.sum() > 30
-    with pytest.raises(MotionLabError, match="contact"):
+    with pytest.raises(ViewerError, match=r"dataclasses\.replace\(motion, contacts="):
         still(stroll(), contacts=True)
 
 
@@ -182,11 +183,29 @@ def test_video(tmp_path):
         (lambda m: still(m.positions()[:, 1:], skeleton=m.skeleton), "needs"),
         (lambda m: video(m, "film.avi"), ".mp4"),
         (lambda m: video(m, "film.mp4", size=(33, 32)), "even"),
+        (lambda m: video(m, "nodir/film.mp4"), "no folder 'nodir'"),
+        (lambda m: video(m, "nodir/film.gif"), "no folder 'nodir'"),
+        (lambda m: video(m, "film.mp4", fps=0), "fps is 0"),
+        (lambda m: video(m, "film.mp4", fps=-5), "fps is -5"),
+        (lambda m: video(m, "film.mp4", fps=float("nan")), "fps is nan"),
+        (lambda m: video(m, "film.mp4", fps="30"), "fps is '30'"),
+        (lambda m: video(m, "film.mp4", background="blu"), "^background: 'blu'"),
+        (lambda m: filmstrip(m, 0), "0 bodies"),
+        (lambda m: filmstrip(m, -1), "-1 bodies"),
+        (lambda m: filmstrip(m, 2.5), "2.5 bodies"),
+        (lambda m: still(m, 1.5), "frame 1.5 is not a whole number"),
+        (lambda m: still([m, m]), "one motion at a time"),
+        (lambda m: still(m, color="blu"), "^color: 'blu'"),
     ],
 )
 def test_what_cannot_be_drawn_is_said(call, message):
-    with pytest.raises(MotionLabError, match=message):
+    with pytest.raises(ViewerError, match=message):
         call(stroll())
+
+
+def test_a_short_motion_makes_a_short_filmstrip():
+    strip = filmstrip(stroll(3, speed=0.0), 8, labels=False, backend="matplotlib")
+    assert label(solid(strip))[1] == 3
 
 
 @pytest.fixture
@@ -228,3 +247,16 @@ def test_the_environment_can_choose(fresh_probe, monkeypatch):
     monkeypatch.setenv("MOTIONLAB_BACKEND", "matplotlib")
     assert probe_.choose() == "matplotlib"
     assert probe_.choose("vtk") == "vtk"
+
+
+def test_a_gif_lasts_as_long_as_the_motion(tmp_path):
+    motion = Motion(
+        Skeleton.canonical(), torch.zeros(30, 3), torch.eye(3).expand(30, 21, 3, 3), fps=30
+    )
+    path = video(motion, tmp_path / "a.gif", size=(64, 48), backend="matplotlib")
+    with Image.open(path) as gif:
+        lengths = 0
+        for page in range(gif.n_frames):
+            gif.seek(page)
+            lengths += gif.info["duration"]
+    assert lengths == 1000

@@ -21,12 +21,15 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})  # tab completion finds what is not imported yet
+
+
 def __getattr__(name: str):
     if name in _STILLS:
         return getattr(import_module(".stills", __name__), name)
     if name == "plots":
         return import_module(".plots", __name__)
     if name == "scene":
-        globals()[name] = import_module(".scene", __name__).scene  # not the module of that name
-        return globals()[name]
+        return import_module(".scene3d", __name__).scene
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,7 +6,7 @@ little softened so that they sit on a white and on a black page alike. Mocap is 
 
 from __future__ import annotations
 
-from motionlab.errors import MotionLabError
+from motionlab.errors import ViewerError
 
 COLORS = {
     "mocap": "#9aa3ad",
@@ -33,14 +33,17 @@ def color(name: str, index: int = 0) -> str:
     return COLORS.get(name, CYCLE[index % len(CYCLE)])
 
 
-def check_color(value: str) -> str:
-    """Give back a hex colour; method names and matplotlib's colour names are understood too."""
+def check_color(value: str, argument: str = "color") -> str:
+    """Give back a hex colour; method names and matplotlib's colour names are understood too.
+
+    `argument` is what errors call it.
+    """
     from matplotlib.colors import to_hex
 
     try:
         return COLORS[value] if value in COLORS else to_hex(value)
     except (ValueError, TypeError) as error:
-        raise MotionLabError(
-            f"colors: {value!r} is no colour. Use a method's name ({', '.join(COLORS)}), "
+        raise ViewerError(
+            f"{argument}: {value!r} is no colour. Use a method's name ({', '.join(COLORS)}), "
             "a name matplotlib knows or a hex code such as '#4c86b8'."
         ) from error

@@ -201,7 +201,7 @@ class Player(anywidget.AnyWidget):
     payload = traitlets.Dict().tag(sync=True)
     frame = traitlets.Int(0).tag(sync=True)
     playing = traitlets.Bool(False).tag(sync=True)
-    speed = traitlets.Float(1.0).tag(sync=True)
+    speed = traitlets.Float(1.0, min=0.0).tag(sync=True)
     follow = traitlets.Bool(True).tag(sync=True)
     overlay = traitlets.Bool(False).tag(sync=True)
     caption = traitlets.Unicode("").tag(sync=True)
@@ -211,6 +211,13 @@ class Player(anywidget.AnyWidget):
         state = {name: payload[name] for name in ("speed", "follow", "overlay") if name in payload}
         playing = bool(payload.get("autoplay", False))
         super().__init__(payload=payload, **{"playing": playing, **state, **traits})
+
+    def __repr__(self) -> str:
+        count = len(self.payload["tracks"])
+        return (
+            f"Player({count} motion{'s' if count > 1 else ''}, {self.payload['frames']} frames, "
+            f"{self.payload['fps']:g} fps)"
+        )
 
     @traitlets.validate("frame")
     def _inside(self, proposal: dict[str, Any]) -> int:

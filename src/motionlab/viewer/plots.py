@@ -15,8 +15,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
+from ..errors import ViewerError
 from ..motion import Motion
 from . import palette
+from .take import check_frame
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 # viridis without its ends, which vanish on a black or a white page
@@ -37,14 +39,22 @@ def styled(draw):
     return drawn
 
 
+def _check_motion(plot: str, motion: Motion, frames: int = 1) -> None:
+    if not isinstance(motion, Motion):
+        raise ViewerError(f"{plot}: needs a Motion, not {motion!r}.")
+    if len(motion) < frames:
+        raise ViewerError(f"{plot}: {motion!r} is too short; it needs {frames} frames or more.")
+
+
 @styled
 def joint_map(motion: Motion, frame: int = 0) -> Figure:
     """The hierarchy on the body: bones as lines, joints by name, seen from the front.
 
     The left half of the body is named on the right of the picture, as on someone who faces you.
     """
+    _check_motion("joint_map", motion)
     skeleton = motion.skeleton
-    points = motion.positions()[frame].numpy()
+    points = motion.positions()[check_frame(frame, len(motion))].numpy()
     across = _across(motion, points)
     x = (points - points[0])[:, [0, 2]] @ across  # metres to the body's left
     y = points[:, 1] - points[:, 1].min()
@@ -90,7 +100,11 @@ def _name_joints(axes, skeleton, x: np.ndarray, y: np.ndarray) -> None:
 @styled
 def bars(values: Sequence[float], names: Sequence[str], label: str) -> Figure:
     """One bar a name, in the given order; `label` names the quantity with its unit."""
-    values = np.asarray(values, dtype=float)
+    values, names = np.asarray(values, dtype=float), list(names)
+    if values.shape != (len(names),):
+        raise ViewerError(
+            f"bars: {len(names)} names for values of shape {values.shape}; give one name a value."
+        )
     figure, axes = plt.subplots(figsize=(7, 0.6 + 0.2 * len(values)))
     axes.barh(range(len(values)), values, color=palette.CYCLE[0], height=0.7)
     axes.set_yticks(range(len(values)), names, fontsize=9)
@@ -128,7 +142,19 @@ def root_paths(motions: Sequence[Motion], labels: Sequence[str] | None = None) -
 
     Every path starts at (0, 0), so that shapes can be compared.
     """
-    labels = labels or [motion.name for motion in motions]
+    if not isinstance(motions, list | tuple) or not motions:
+        raise ViewerError(
+            f"root_paths: {motions!r} is not a list of motions; give one, as root_paths([motion])."
+        )
+    for motion in motions:
+        _check_motion("root_paths", motion, frames=2)
+    if labels is None:
+        labels = [motion.name for motion in motions]
+    labels = [labels] if isinstance(labels, str) else list(labels)
+    if len(labels) != len(motions):
+        raise ViewerError(
+            f"root_paths: {len(labels)} labels for {len(motions)} motions; give one for each."
+        )
     figure, axes = plt.subplots(figsize=(7, 5))
     speeds = [_ground_speed(motion) for motion in motions]
     top = max(float(np.percentile(speed, 98)) for speed in speeds)
@@ -140,9 +166,11 @@ def root_paths(motions: Sequence[Motion], labels: Sequence[str] | None = None) -
         axes.add_collection(lines)
         second = path[:: max(round(motion.fps), 1)]
         axes.scatter(*second.T, s=14, color="white", edgecolor=INK, zorder=3)
-        axes.annotate(label, path[-1], (6, 6), textcoords="offset points", fontsize=10)
+        far = path[np.linalg.norm(path, axis=-1).argmax()]  # where others rarely are
+        axes.annotate(label, far, (6, 6), textcoords="offset points", fontsize=10)
     figure.colorbar(lines, ax=axes, label="speed of the root (m/s)", shrink=0.8)
-    axes.set(xlabel="x (m)", ylabel="z (m)", aspect="equal")
+    axes.set(xlabel="x (m)", ylabel="z (m)")
+    axes.set_aspect("equal", adjustable="datalim")  # a straight path still gets a whole picture
     axes.margins(0.15)
     axes.autoscale_view()
     return figure
@@ -159,6 +187,7 @@ def feet(motion: Motion, threshold: float = 0.45) -> Figure:
 
     Where the motion carries contact labels, these are drawn under the guess.
     """
+    _check_motion("feet", motion, frames=2)
     figure, (height, speed, contact) = plt.subplots(
         3, 1, figsize=(7.5, 5.5), sharex=True, height_ratios=(2, 2, 1)
     )

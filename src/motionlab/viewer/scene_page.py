@@ -21,6 +21,7 @@ import roma
 import torch
 from matplotlib.colors import to_rgb
 
+from motionlab.errors import ViewerError
 from motionlab.viewer import stills
 from motionlab.viewer.picture import GRID
 
@@ -86,6 +87,12 @@ _OPEN = (
 
 def save(scene, path: Path) -> Path:
     """Write a page that holds the scene, its motion and vtk.js."""
+    if path.suffix.lower() != ".html":
+        raise ViewerError(
+            f"scene.save: {path.name!r} must end in .html: it is a page to be turned about. "
+            "For a picture use motionlab.viewer.still."
+        )
+    stills.check_folder(path)
     page = f'<!doctype html><meta charset="utf-8"><title>scene</title>{figure_html(scene, True)}'
     path.write_text(page, encoding="utf-8")
     return path

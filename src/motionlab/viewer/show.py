@@ -160,7 +160,7 @@ def _track(
         )
     label = label or ""
     fallback = color(label, index) if count > 1 or label else color("mocap")
-    return Track(positions, bones, label, check_color(look) if look else fallback, feet)
+    return Track(positions, bones, label, check_color(look, "colors") if look else fallback, feet)
 
 
 def _per_motion(name: str, value: Any, count: int) -> list[str | None]:
@@ -219,10 +219,16 @@ def _rate(motions: list[Motion | Tensor], fps: float | None) -> float:
 def _paths(paths: Any, count: int) -> list[dict[str, Any]]:
     if paths is None:
         return []
-    many = isinstance(paths, list | tuple) and len(paths) and np.ndim(paths[0]) == 2
+    try:
+        many = isinstance(paths, list | tuple) and len(paths) and np.ndim(paths[0]) == 2
+        ways = [np.asarray(path, dtype=np.float64) for path in (paths if many else [paths])]
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ViewerError(
+            f"show: paths is a {type(paths).__name__} that is not numbers ({error}); give an array "
+            "(n, 2) of x, z or (n, 3) of points in metres, or a list of such arrays."
+        ) from error
     made = []
-    for i, path in enumerate(paths if many else [paths]):
-        points = np.asarray(path, dtype=np.float64)
+    for i, points in enumerate(ways):
         if points.ndim != 2 or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
             raise ViewerError(
                 f"show: path {i} has shape {points.shape}; give (n, 2) of x, z or (n, 3) of points, "

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +96,7 @@ def filmstrip(
     Parameters
     ----------
     motion : a Motion, or positions (frames, points, 3) in metres with ``skeleton`` and ``fps``.
-    frames : how many, evenly over the motion, or the list of them.
+    frames : how many, evenly over the motion (all, if it has fewer), or the list of them.
     width : pixels; the height follows from the poses.
     view : as in :func:`still`; None sees travel from the side, all else in three-quarter view.
     labels : write the time under each pose, in seconds from the start of the motion.
@@ -103,9 +104,7 @@ def filmstrip(
     """
     width, _ = check_size((width, 2))
     take = Take.of(motion, color=color, contacts=contacts, skeleton=skeleton, fps=fps)
-    if isinstance(frames, int):
-        frames = np.linspace(0, len(take.positions) - 1, max(frames, 1)).round()
-    frames = take.check_frames(frames)
+    frames = take.check_frames(take.spread(frames) if np.ndim(frames) == 0 else frames)
     figures, roots, camera = _line_up(take, frames, view)
 
     hulls = np.concatenate([take.hull(figure) for figure in figures])
@@ -162,6 +161,7 @@ def video(
     path, size = Path(path), check_size(size, even=True)
     if path.suffix.lower() not in (".mp4", ".gif"):
         raise ViewerError(f"video: {path.name!r} must end in .mp4 or .gif.")
+    check_folder(path)
     take = Take.of(motion, color=color, contacts=contacts, skeleton=skeleton, fps=fps)
     rate = float(fps or min(take.fps, 30.0))
     count = max(1, round(len(take.positions) / take.fps * rate))
@@ -171,7 +171,7 @@ def video(
     way = take.followed
     camera = Camera(way[0], direction(view, take.mean_facing), take.height)
     camera = camera.fitted(take.poses_at(way), size[0] / size[1], margin=1.12)
-    paper = Image.new("RGBA", size, palette.check_color(background))
+    paper = Image.new("RGBA", size, palette.check_color(background, "background"))
     with open_painter(size, backend) as paint, _writer(path, rate, size) as write:
         for frame in tqdm(moments, desc=path.name, disable=not progress):
             moved = replace(camera, target=camera.target + way[frame] - way[0])
@@ -260,7 +260,10 @@ def _writer(path: Path, fps: float, size: tuple[int, int]) -> Iterator[Callable]
         # One palette for all pages, else colours flicker.
         first = pages[len(pages) // 2].quantize(255, dither=Image.Dither.NONE)
         pages = [page.quantize(palette=first, dither=Image.Dither.NONE) for page in pages]
-        pages[0].save(path, save_all=True, append_images=pages[1:], duration=1000 / fps, loop=0)
+        # GIF counts hundredths of a second: pages of unequal length keep the motion's time.
+        turns = [round(100 * page / fps) for page in range(len(pages) + 1)]
+        lengths = [10 * (end - start) for start, end in pairwise(turns)]
+        pages[0].save(path, save_all=True, append_images=pages[1:], duration=lengths, loop=0)
         return
     try:
         import imageio_ffmpeg
@@ -278,6 +281,11 @@ def _writer(path: Path, fps: float, size: tuple[int, int]) -> Iterator[Callable]
         yield lambda image: sink.send(image.tobytes())
     finally:
         sink.close()
+
+
+def check_folder(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise ViewerError(f"{path}: there is no folder {str(path.parent)!r}; make it first.")
 
 
 def check_size(size: tuple[int, int], even: bool = False) -> tuple[int, int]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral, Real
 
 import numpy as np
 import torch
@@ -18,6 +21,23 @@ from motionlab.viewer.picture import UP, Figure, capsules, unit
 
 FLOOR_SLACK = 0.15  # metres, as in the player
 FOLLOW_SECONDS = 0.5  # the following camera ignores what is quicker
+
+
+def check_frame(frame: int, count: int) -> int:
+    """A plain index from 0 into `count` frames; negative ones count from the end."""
+    try:
+        index = operator.index(frame)
+    except TypeError as error:
+        raise ViewerError(f"frame {frame!r} is not a whole number; round it.") from error
+    if not -count <= index < count:
+        raise ViewerError(f"frame {index} is not in this motion of {count} frames.")
+    return index % count
+
+
+def _rate(fps: float) -> float:
+    if not isinstance(fps, Real) or not 0 < fps < math.inf:  # NaN is not either
+        raise ViewerError(f"fps is {fps!r}; give frames per second, a positive number as 30.")
+    return float(fps)
 
 
 @dataclass(frozen=True)
@@ -34,6 +54,12 @@ class Take:
     @classmethod
     def of(cls, motion, *, color=None, contacts=False, skeleton=None, fps=None) -> Take:
         """Take a Motion, or positions (frames, points, 3) with their skeleton and rate."""
+        if isinstance(motion, list | tuple):
+            raise ViewerError(
+                "a list can't be drawn: give one motion at a time, or play several with "
+                "motionlab.show([a, b])."
+            )
+        fps = None if fps is None else _rate(fps)
         skeleton = skeleton if skeleton is not None else getattr(motion, "skeleton", None)
         if skeleton is None:
             raise ViewerError(
@@ -52,8 +78,9 @@ class Take:
             raise ViewerError(f"positions of frame {int(bad.nonzero()[0])} hold NaN or infinity.")
         if contacts and getattr(motion, "contacts", None) is None:
             raise ViewerError(
-                "contacts=True, but this motion has no contact labels; "
-                "set motion.contacts or leave contacts=False."
+                "contacts=True, but this motion has no contact labels; draw "
+                "dataclasses.replace(motion, contacts=labels), with labels of shape (frames, 4), "
+                "or leave contacts=False."
             )
         dress = body(skeleton)
         return cls(
@@ -61,21 +88,26 @@ class Take:
             fps=float(motion.fps if is_motion else fps or 30.0),
             body=dress,
             roles=dict(skeleton.roles),
-            color=np.array(to_rgb(palette.check_color(color or "mocap"))),
+            color=np.array(to_rgb(palette.check_color("mocap" if color is None else color))),
             contacts=np.asarray(motion.contacts) if contacts else None,
         )
 
     def check_frames(self, frames: Sequence[int]) -> list[int]:
         """Plain indices from 0; negative ones count from the end."""
-        count = len(self.positions)
-        checked = []
-        for frame in frames:
-            if not -count <= int(frame) < count:
-                raise ViewerError(f"frame {frame} is not in this motion of {count} frames.")
-            checked.append(int(frame) % count)
+        checked = [check_frame(frame, len(self.positions)) for frame in frames]
         if not checked:
             raise ViewerError("no frame to draw; name at least one.")
         return checked
+
+    def spread(self, count: int) -> np.ndarray:
+        """Frames evenly over the motion, `count` of them or all that there are."""
+        if not isinstance(count, Integral) or count < 1:
+            raise ViewerError(
+                f"frames: {count!r} bodies can't be drawn; give a whole number from 1 on, or a "
+                "list of frames."
+            )
+        last = len(self.positions) - 1
+        return np.linspace(0, last, min(count, last + 1)).round().astype(int)
 
     @cached_property
     def bones(self) -> np.ndarray:

@@ -11,6 +11,7 @@ import pytest
 import torch
 
 from motionlab import Motion, MotionLabError, Skeleton
+from motionlab.errors import ViewerError
 from motionlab.viewer import scene
 from motionlab.viewer.scene_page import DOTS_PER_SECOND, viewer_script, write_viewer
 
@@ -93,6 +94,14 @@ def test_the_viewer_is_one_classic_script(tmp_path, motion, monkeypatch):
     assert "OfflineLocalView" in viewer_script() and "import.meta" not in viewer_script()
     alone = scene(motion).save(tmp_path / "alone.html")
     assert alone.stat().st_size > path.stat().st_size, "vtk.js is inside"
+
+
+def test_only_a_page_can_be_saved(motion, tmp_path):
+    shown = scene(motion)
+    for name, message in (("scene.png", "must end in .html"), ("no/scene.html", "no folder")):
+        with pytest.raises(ViewerError, match=message):
+            shown.save(tmp_path / name)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
