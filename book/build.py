@@ -35,7 +35,7 @@ def vendor() -> None:
             sys.exit("npm could not fetch the pages' scripts: the first build needs the network.")
         shutil.copyfile(lock, fetched)
     shutil.rmtree(VENDOR, ignore_errors=True)
-    icons = {f"@jupyter-widgets/{f.name}": f for f in (modules / WIDGETS).glob("*.woff2")}
+    icons = {f"{WIDGETS}/{f.name}": f for f in (modules / WIDGETS).glob("*.woff2")}
     for name, source in (VENDORED | icons).items():
         (VENDOR / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(modules / source, VENDOR / name)

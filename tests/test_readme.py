@@ -28,7 +28,7 @@ def test_the_example_runs(tmp_path, monkeypatch, capsys):
     assert travelled == pytest.approx(14, rel=0.05)  # 10 s at 1.4 m/s
     import motionlab as ml
 
-    written = ml.read_bvh("walk.bvh")
+    written = ml.read_bvh("mirrored.bvh")
     assert written.fps == 60
     assert (written.positions()[::2] - names["mirrored"].positions()).abs().max() < 1e-4
 

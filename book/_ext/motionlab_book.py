@@ -5,10 +5,10 @@ from pathlib import Path
 from sphinx.application import Sphinx
 from sphinx.util import logging
 
+from motionlab.viewer import bundle_path
 from motionlab.viewer.scene_page import write_viewer
 
 CHAPTER_SECONDS = 150
-PLAYER = Path(__file__).parents[2] / "src" / "motionlab" / "viewer" / "static" / "player.js"
 
 # Search reads each found page for an excerpt; browsers forbid that to a page opened from disk.
 SEARCH_FROM_DISK = (
@@ -37,7 +37,7 @@ def copy_scripts(app: Sphinx, error) -> None:
     """One player and one viewer of scenes for the whole book."""
     if error is None and app.builder.format == "html":
         static = Path(app.outdir) / "_static"
-        (static / "motionlab-player.js").write_bytes(PLAYER.read_bytes())
+        (static / "motionlab-player.js").write_bytes(bundle_path().read_bytes())
         write_viewer(static)
 
 
