@@ -2,7 +2,7 @@
 # make test   run all tests                               make clean   remove what these made
 #
 # With no active environment (venv or conda) a target first makes .venv from requirements-lock.txt.
-# A second run installs nothing and needs no network. Without make, see CONTRIBUTING.md.
+# A second run installs nothing and needs no network. Without make: README.md, "No `make`?".
 
 PYTHON3 ?= python3
 
@@ -12,11 +12,6 @@ environment := .venv/installed
 else
 python := python
 environment := active-environment
-endif
-
-# The data folder is read by notebooks and tests that run elsewhere.
-ifdef MOTIONLAB_DATA
-export MOTIONLAB_DATA := $(abspath $(MOTIONLAB_DATA))
 endif
 
 .PHONY: book test lint clean active-environment
@@ -43,7 +38,7 @@ clean:
 	touch $@
 
 # The editable installation also bundles the player from web/ (hatch_build.py).
-.venv/installed: .venv/requirements pyproject.toml hatch_build.py $(wildcard web/*.json web/src/*)
+.venv/installed: .venv/requirements pyproject.toml hatch_build.py $(wildcard web/*.js* web/src/*)
 	$(python) -m pip install --no-deps --no-build-isolation --editable .
 	touch $@
 

@@ -15,7 +15,7 @@ OUTPUTS = ("player.js", "widget.js")
 
 
 class PlayerBuildHook(BuildHookInterface):
-    """Runs ``npm ci`` and esbuild unless the bundles are newer than what they are made from."""
+    """Runs npm and esbuild unless the bundles are newer than what they are made from."""
 
     PLUGIN_NAME = "custom"
 
@@ -28,12 +28,7 @@ class PlayerBuildHook(BuildHookInterface):
             return
         static.mkdir(parents=True, exist_ok=True)
         self.app.display_info("Bundling the motion player (npm ci, esbuild)")
-        # Ignoring scripts: esbuild's only checks its own binary, and no package may run code here.
-        _run(
-            web,
-            "npm",
-            ["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--fetch-retries=1"],
-        )
+        _fetch(web)
         _run(web, "node", ["build.js"])
         missing = [path.name for path in outputs if not path.is_file()]
         if missing:
@@ -53,6 +48,16 @@ def _fresh(web: Path, outputs: list[Path]) -> bool:
         return False
     newest = max((path.stat().st_mtime for path in sources if path.exists()), default=0.0)
     return min(path.stat().st_mtime for path in outputs) >= newest
+
+
+def _fetch(web: Path) -> None:
+    """``npm ci``, unless it has run for this lock: a change in web/src needs no network."""
+    lock, fetched = web / "package-lock.json", web / "node_modules" / ".fetched-by-this-lock"
+    if fetched.exists() and fetched.read_bytes() == lock.read_bytes():
+        return
+    # Ignoring scripts: esbuild's only checks its own binary, and no package may run code here.
+    _run(web, "npm", ["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--fetch-retries=1"])
+    shutil.copyfile(lock, fetched)
 
 
 def _run(web: Path, program: str, arguments: list[str]) -> None:

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+if folder := os.environ.get("MOTIONLAB_DATA"):  # some tests run elsewhere
+    os.environ["MOTIONLAB_DATA"] = str(Path(folder).resolve())
+
 SOURCES = ("accad", "aclstm-cmu", "bandai-actions", "bandai-locomotion", "cmu")
 
 

@@ -1,12 +1,15 @@
 """The files around the code say what is true: environment, lock, map, reference, imports."""
 
 import ast
+import importlib.util
 import json
 import re
+import shutil
 import subprocess
 import tomllib
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -30,6 +33,8 @@ GROUPS = [
 
 def tracked(*under: str) -> list[Path]:
     """Files that git keeps or would keep: not what .gitignore names."""
+    if shutil.which("git") is None:
+        pytest.skip("no git on this machine")
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", *under],
         cwd=ROOT, capture_output=True, text=True, encoding="utf-8",
@@ -136,6 +141,22 @@ def test_every_chapter_is_in_the_table_of_contents():
     toc = (ROOT / "book" / "_toc.yml").read_text(encoding="utf-8")
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         assert f"notebooks/{path.stem}" in toc
+
+
+@pytest.mark.parametrize("url", ["", "https://example.org/motionlab"])
+def test_buttons_are_there_if_the_repository_is_known(url):
+    pytest.importorskip("sphinx")
+    path = ROOT / "book" / "_ext" / "motionlab_book.py"
+    spec = importlib.util.spec_from_file_location("motionlab_book", path)
+    extension = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(extension)
+    launch = {"binderhub_url": "https://mybinder.org"}
+    options = {"repository_url": url, "launch_buttons": launch, "show_toc_level": 2}
+    extension.drop_buttons_without_repository(None, SimpleNamespace(html_theme_options=options))
+    assert options.pop("show_toc_level") == 2
+    known = {"repository_url": url, "launch_buttons": launch} if url else {}
+    buttons = ("use_repository_button", "use_issues_button", "use_source_button")
+    assert options == known | dict.fromkeys(buttons, bool(url))
 
 
 def test_files_are_small_and_nothing_large_is_kept():

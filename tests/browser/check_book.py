@@ -4,20 +4,25 @@
 
 Each page is opened from disk and from a local server, on a desktop and on a phone. It fails if a
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
-if a formula stays TeX; if a player stands still, or does not follow its slider. Exit status 1, and
-one line for each trouble. Needs Chromium on the PATH (or its path in CHROMIUM).
+if a formula stays TeX; if a player stands still, or does not follow its slider; if a scene stays
+empty or does not follow its own. Exit status 1, and one line for each trouble. Needs Chromium on the
+PATH (or its path in CHROMIUM).
 """
 
 import functools
 import http.server
+import io
 import os
 import shutil
 import sys
 import threading
+import time
+from collections.abc import Callable
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import BrowserContext, Page, TimeoutError, sync_playwright
 
 PAGE_BYTES = 2.5e6  # a page's own weight: its HTML and what only it loads
@@ -30,7 +35,8 @@ FLAGS = [  # WebGL in software: the machine that checks may have no graphics car
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
-PLAYER = ".motionlab-player"
+PLAYER, SCENE = ".motionlab-player", ".motionlab-scene iframe"
+CONTRAST = 40  # of 255 levels of grey: less between the darkest and the lightest is nothing drawn
 
 
 class Visit:
@@ -114,6 +120,53 @@ class Visit:
         if pictures[0] == pictures[1]:
             self.trouble(f"{name} shows the same picture wherever its slider stands")
 
+    def check_scenes(self) -> None:
+        for number in range(self.page.locator(SCENE).count()):
+            self._check_scene(number)
+
+    def _check_scene(self, number: int) -> None:
+        frame = self.page.locator(SCENE).nth(number)
+        name = f"scene {number + 1}"
+        frame.scroll_into_view_if_needed()  # it loads when it comes into view
+        try:
+            view = frame.content_frame.locator("#view:has(canvas)")
+            view.wait_for(timeout=PATIENCE)
+            slider = frame.content_frame.locator("#frame")
+            slider.wait_for(timeout=PATIENCE)
+        except TimeoutError:
+            self.trouble(f"{name} did not start")
+            return
+        # Without the names of the axes: they are text, there before the scene is.
+        picture = functools.partial(view.screenshot, style="#axes { visibility: hidden }")
+        if not self._until(lambda: contrast(picture()) >= CONTRAST):
+            self.trouble(f"{name} draws nothing")
+            return
+        last = slider.evaluate("s => Number(s.max)")
+        slider.fill(str(round(0.2 * last)))
+        first = self._when_still(picture)
+        slider.fill(str(round(0.7 * last)))
+        if not self._until(lambda: picture() != first):
+            self.trouble(f"{name} shows the same picture wherever its slider stands")
+
+    def _until(self, done: Callable[[], bool]) -> bool:
+        """Whether it was done in time: drawing in software may take its while."""
+        end = time.monotonic() + PATIENCE / 1000
+        while not (was_done := done()) and time.monotonic() < end:
+            self.page.wait_for_timeout(300)
+        return was_done
+
+    def _when_still(self, picture: Callable[[], bytes]) -> bytes:
+        """The picture once it no longer changes."""
+        seen = [picture()]
+
+        def still() -> bool:
+            self.page.wait_for_timeout(600)
+            seen.append(picture())
+            return seen[-1] == seen[-2]
+
+        self._until(still)
+        return seen[-1]
+
     def _play(self, player, on: bool) -> None:
         button = player.get_by_role("button", name="Play" if on else "Pause", exact=True)
         if button.count():
@@ -121,6 +174,12 @@ class Visit:
 
     def _picture(self, player) -> bytes:
         return player.locator("canvas").first.screenshot()
+
+
+def contrast(png: bytes) -> int:
+    """Levels of grey, of 255, between the darkest and the lightest spot."""
+    darkest, lightest = Image.open(io.BytesIO(png)).convert("L").getextrema()
+    return lightest - darkest
 
 
 @contextmanager
@@ -166,6 +225,7 @@ def check_page(window: BrowserContext, base: str, path: Path, folder: Path) -> l
     visit.check_width()
     if visit.page.viewport_size["width"] == DESKTOP[0]:
         visit.check_players()
+        visit.check_scenes()
     weight = own_weight(visit.loaded, base, folder)
     if weight > PAGE_BYTES:
         visit.trouble(f"weighs {weight / 1e6:.1f} MB, allowed {PAGE_BYTES / 1e6} MB")

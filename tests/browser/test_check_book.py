@@ -6,6 +6,15 @@ check_book = pytest.importorskip("check_book", exc_type=ImportError)
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
+
+def scene(view: str) -> str:
+    """A page with a frame such as a scene's; its slider does nothing."""
+    inner = f"<div id=view style='height: 100px'>{view}</div><input id=frame type=range>"
+    return (
+        f'<figure class="motionlab-scene"><iframe loading=lazy srcdoc="{inner}"></iframe></figure>'
+    )
+
+
 FAULTS = {
     "asks for": '<img src="http://example.invalid/a.png">',
     "console: broken": "<script>console.error('broken')</script>",
@@ -18,6 +27,9 @@ FAULTS = {
         '<figure class="motionlab-player"><canvas></canvas><button>Play</button>'
         '<input type="range" max="100"></figure>'
     ),
+    "scene 1 did not start": scene("The script of this scene is missing beside the page."),
+    "scene 1 draws nothing": scene("<canvas></canvas>"),
+    "scene 1 shows the same picture": scene("<canvas width=50 style='background: black'></canvas>"),
 }
 SEARCH = '<div id="search-results"><li><a href="index.html">found</a></li></div>'
 
