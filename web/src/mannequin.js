@@ -100,12 +100,6 @@ export class Mannequin extends Group {
     });
     position.needsUpdate = normal.needsUpdate = true;
   }
-
-  dispose() {
-    this.geometry.dispose();
-    this.material.dispose();
-    this.outline.dispose();
-  }
 }
 
 const COS = Array.from({ length: SIDES }, (_, i) => Math.cos((2 * Math.PI * i) / SIDES));

@@ -11,7 +11,7 @@ actor by ACCAD Motion Lab, The Ohio State University (CC BY 3.0), see `gait_curv
 Contacts are labels of `Motion.contacts`: left heel (ankle joint), left toe (toe joint), right heel,
 right toe. A label is true in a frame if and only if the joint rests in place at that instant: it
 came to rest at or before it and leaves at or after it. Between two successive frames that carry the
-label the joint therefore does not move (float rounding aside, far below 1 mm). A foot that strikes
+label within one stance the joint therefore does not move (float rounding aside, far below 1 mm). A foot that strikes
 with the heel rests on the ankle while the toes come down; one that strikes with the fore-foot rests
 on the toes; before toe-off the ankle turns about the resting toes.
 """

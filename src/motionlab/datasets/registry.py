@@ -242,7 +242,7 @@ def info(name: str) -> Info:
             title="Procedural walking and running with exact contact labels",
             licence="MIT, as motionlab",
             commercial=True,
-            citation="",
+            citation="Curves fitted to clips of the ACCAD Motion Lab, The Ohio State University.",
             home="",
             quirks=("Made by motionlab.datasets.gaits; needs no file and no network.",),
         )

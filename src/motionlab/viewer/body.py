@@ -76,11 +76,6 @@ class Body:
         return torch.cat([positions, start + along * (end - start)], dim=-2)
 
 
-def bones(skeleton) -> tuple[Bone, ...]:
-    """The capsules of :func:`body`; their indices run over ``body(skeleton).points(positions)``."""
-    return body(skeleton).bones
-
-
 def body(skeleton) -> Body:
     """Dress a skeleton. Joints of unknown role get limbs whose radius follows their length."""
     return _Tailor(skeleton).dress()

@@ -24,7 +24,6 @@ COLORS = {
 }
 # Order for motions that are not named after a method.
 CYCLE = ("#4c86b8", "#d98324", "#1f9e7a", "#c9689c", "#e3b93a", "#5b5fc7", "#c8503c", "#9aa3ad")
-CONTACT = "#ff6a3d"
 PATH = "#e3b93a"
 
 
