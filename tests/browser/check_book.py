@@ -84,7 +84,14 @@ class Visit:
         if self.page.locator("mjx-merror, [data-mjx-error]").count():
             self.trouble("a formula that MathJax does not understand")
 
+    def open_dropdowns(self) -> None:
+        """Show hidden solutions, as a reader does: a player in one starts when it comes into view."""
+        self.page.evaluate(
+            "document.querySelectorAll('.toggle-hidden .toggle-button').forEach(b => b.click())"
+        )
+
     def check_players(self) -> None:
+        self.open_dropdowns()
         for number in range(self.page.locator(PLAYER).count()):
             self._check_player(number)
 
