@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from motionlab.kinematics import forward_kinematics
+from motionlab.kinematics import forward_kinematics, heading, yaw_matrix
 
 
 def random_body(seed: int, batch: tuple[int, ...], joints: int, ends: int = 2):
@@ -110,3 +110,71 @@ def test_sampling_first_does_not_spoil_training():
     body["rotations"] = body["rotations"].clone().requires_grad_()
     forward_kinematics(**body)[0].sum().backward()
     assert body["rotations"].grad.abs().sum() > 0
+
+
+# -- heading ---------------------------------------------------------------------------------------
+
+
+def random_rotations(seed: int, count: int) -> torch.Tensor:
+    return torch.tensor(Rotation.random(count, rng=np.random.default_rng(seed)).as_matrix())
+
+
+def test_yaw_matrix_turns_forward_to_the_left():
+    yaw = torch.linspace(-7, 7, 29, dtype=torch.float64)
+    expected = Rotation.from_euler("y", yaw[:, None].numpy()).as_matrix()
+    np.testing.assert_allclose(yaw_matrix(yaw).numpy(), expected, atol=1e-15)
+    quarter = yaw_matrix(torch.tensor(torch.pi / 2)) @ torch.tensor([0.0, 0.0, 1.0])
+    torch.testing.assert_close(quarter, torch.tensor([1.0, 0.0, 0.0]))  # left is +x
+    assert yaw_matrix(torch.zeros(2, 0, 4)).shape == (2, 0, 4, 3, 3)
+
+
+def test_heading_leaves_a_swing_without_yaw():
+    rotations = random_rotations(0, 2000)
+    yaw = heading(rotations)
+    swing = Rotation.from_matrix((yaw_matrix(yaw).mT @ rotations).numpy())
+    np.testing.assert_allclose(swing.as_rotvec()[:, 1], 0, atol=1e-12)
+    # the twist of scipy's quaternion
+    quaternions = Rotation.from_matrix(rotations.numpy()).as_quat(scalar_first=True)
+    twist = 2 * np.arctan2(quaternions[:, 2], quaternions[:, 0])
+    np.testing.assert_allclose(np.cos(twist - yaw.numpy()), 1, atol=1e-12)
+    # the nearest of all turns about y
+    others = torch.linspace(-torch.pi, torch.pi, 200, dtype=torch.float64)
+    nearest = (yaw_matrix(others) - rotations[:20, None]).flatten(2).norm(dim=-1).min(-1).values
+    own = (yaw_matrix(yaw[:20]) - rotations[:20]).flatten(1).norm(dim=-1)
+    assert (own <= nearest + 1e-12).all()
+
+
+@settings(max_examples=50, deadline=None)
+@given(turn=st.floats(-10, 10), seed=st.integers(0, 2**32))
+def test_heading_follows_a_turn_of_the_world(turn, seed):
+    rotations = random_rotations(seed, 5)
+    turn = torch.tensor(turn, dtype=torch.float64)
+    gained = heading(yaw_matrix(turn) @ rotations) - heading(rotations) - turn
+    torch.testing.assert_close(gained.cos(), torch.ones_like(gained), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("pitch", [-1.57, 0.0, 1.0, 1.5708, 3.0])
+def test_heading_of_a_pitched_body(pitch):
+    """An Euler angle is lost at a pitch of 90 degrees; the heading is not."""
+    pitch = torch.tensor(Rotation.from_euler("x", pitch).as_matrix())
+    torch.testing.assert_close(
+        heading(yaw_matrix(torch.tensor(0.7, dtype=torch.float64)) @ pitch).item(), 0.7
+    )
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("axis", ["x", "z"])
+def test_heading_upside_down_is_finite(axis, dtype):
+    turned = Rotation.from_euler(axis, np.pi).as_matrix()
+    for near in (0, 1e-9, 1e-7, 1e-5, 1e-3):
+        rotation = torch.tensor(turned + near * np.eye(3), dtype=dtype, requires_grad=True)
+        yaw = heading(rotation)
+        yaw.backward()
+        assert yaw.isfinite() and rotation.grad.isfinite().all()
+
+
+def test_heading_gradients():
+    rotations = random_rotations(1, 4).requires_grad_()
+    assert torch.autograd.gradcheck(heading, rotations)
+    yaw = torch.tensor([0.0, 3.1, -2.0], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(yaw_matrix, yaw)

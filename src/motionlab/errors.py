@@ -23,3 +23,27 @@ class DataError(MotionLabError):
 
 class ViewerError(MotionLabError):
     """Something that can't be drawn."""
+
+
+class IkError(MotionLabError):
+    """Inverse kinematics can't be done with what was given."""
+
+
+class RetargetError(MotionLabError):
+    """A motion can't be brought to another skeleton."""
+
+
+class EncodingError(MotionLabError):
+    """A motion can't be encoded, or features can't be decoded."""
+
+
+class MetricError(MotionLabError):
+    """A metric can't be computed from what was given."""
+
+
+class ModelError(MotionLabError):
+    """A model was asked for something it can't do, or its weights do not fit."""
+
+
+class TrainingError(MotionLabError):
+    """A training that can't start, can't go on where it was, or has gone wrong."""

@@ -2,7 +2,7 @@
 
 Every joint carries a rotation relative to its parent. Multiplying them down the tree gives the
 joint's orientation in the world; adding each bone, turned by its parent's orientation, gives its
-position. Batched over any leading dimensions and differentiable.
+position. Batched over any leading dimensions and differentiable. Also here: which way a body faces.
 """
 
 from __future__ import annotations
@@ -59,6 +59,37 @@ def forward_kinematics(
         positions = torch.cat([positions, tips])
     positions = positions.permute(2, 0, 1).reshape(*batch, len(positions), 3)
     return positions, orientations.permute(3, 0, 1, 2).reshape(rotations.shape)
+
+
+def heading(rotations: Tensor) -> Tensor:
+    """Which way a body faces: the yaw of its root, by swing-twist decomposition about y.
+
+    ``R = yaw_matrix(heading(R)) @ swing``, where the swing's rotation vector has no y component.
+    Of all turns about y this one is the nearest to R. Unlike an Euler angle it does not run away
+    when the body pitches by 90 degrees; only a body that is exactly upside down (turned by pi about
+    a horizontal axis) has no heading: 0 is returned there, with zero gradient.
+
+    Parameters
+    ----------
+    rotations : (..., 3, 3), world orientations.
+
+    Returns
+    -------
+    yaw : (...) radians in [-pi, pi]; 0 faces +z, positive turns towards +x (left).
+    """
+    # with the quaternion (w, x, y, z) these are 4 w y and 2 (w² - y²); the yaw is 2 atan2(y, w)
+    sine = rotations[..., 0, 2] - rotations[..., 2, 0]
+    cosine = rotations[..., 0, 0] + rotations[..., 2, 2]
+    upside_down = sine.detach() ** 2 + cosine.detach() ** 2 < torch.finfo(sine.dtype).eps ** 2
+    return torch.atan2(sine.masked_fill(upside_down, 0), cosine.masked_fill(upside_down, 1))
+
+
+def yaw_matrix(yaw: Tensor) -> Tensor:
+    """Rotation (..., 3, 3) about the vertical by yaw (...) radians: turns +z towards +x."""
+    sine, cosine = yaw.sin(), yaw.cos()
+    zero, one = torch.zeros_like(yaw), torch.ones_like(yaw)
+    rows = [cosine, zero, sine, zero, one, zero, -sine, zero, cosine]
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
 
 
 @lru_cache(maxsize=64)
