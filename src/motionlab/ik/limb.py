@@ -1,4 +1,4 @@
-"""Inverse kinematics: joint rotations from where a limb's end should be."""
+"""Two bones in closed form: thigh and shank (or two arm bones) reach a target."""
 
 from __future__ import annotations
 

@@ -1,0 +1,60 @@
+"""Rotations that bring one direction to another, and the twist about a direction."""
+
+from __future__ import annotations
+
+import roma
+import torch
+from torch import Tensor
+
+from ..kinematics import forward_kinematics
+from ..skeleton import Skeleton
+
+
+def unit(v: Tensor) -> Tensor:
+    """Vectors (..., 3) made one long; zero stays zero."""
+    return v / v.norm(dim=-1, keepdim=True).clamp(min=1e-12)
+
+
+def skew(v: Tensor) -> Tensor:
+    """The matrix (..., 3, 3) whose product with u is the cross product of v and u."""
+    x, y, z = v.unbind(-1)
+    zero = torch.zeros_like(x)
+    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape, 3)
+
+
+def swing(a: Tensor, b: Tensor) -> Tensor:
+    """The smallest rotation (..., 3, 3) from direction a (..., 3) to direction b (..., 3).
+
+    Between opposite directions there is no smallest one; exactly there it is the identity.
+    """
+    a, b = unit(a), unit(b)
+    # Rodrigues: with c = a x b, R = I + [c]x + [c]x² / (1 + a·b).
+    across = skew(torch.linalg.cross(a, b))
+    cosine = (a * b).sum(-1)[..., None, None]
+    return torch.eye(3).to(a) + across + across @ across / (1 + cosine).clamp(min=1e-12)
+
+
+def turn_about(axis: Tensor, angle: Tensor) -> Tensor:
+    """Rotation (..., 3, 3) by an angle (...) in radians about a unit axis (..., 3)."""
+    return roma.rotvec_to_rotmat(axis * angle[..., None])
+
+
+def twist_about(rotation: Tensor, axis: Tensor) -> Tensor:
+    """Angle (...), -π to π, of a rotation's (..., 3, 3) twist about a unit axis (..., 3)."""
+    quaternion = roma.rotmat_to_unitquat(rotation)
+    half = torch.atan2((quaternion[..., :3] * axis).sum(-1), quaternion[..., 3])
+    return torch.remainder(2 * half + torch.pi, 2 * torch.pi) - torch.pi
+
+
+def nearest_rotation(matrix: Tensor) -> Tensor:
+    """The rotation (..., 3, 3) nearest to a matrix (..., 3, 3): orthogonal Procrustes."""
+    return roma.special_procrustes(matrix.reshape(-1, 3, 3)).reshape(matrix.shape)
+
+
+def place(skeleton: Skeleton, root: Tensor, rotations: Tensor) -> tuple[Tensor, Tensor]:
+    """Points (..., points, 3) and orientations (..., joints, 3, 3) of a skeleton in a pose.
+
+    root : (..., 3) metres; rotations : (..., joints, 3, 3), local.
+    """
+    s = skeleton
+    return forward_kinematics(s.parents, s.offsets, root, rotations, s.end_parents, s.end_offsets)
