@@ -229,6 +229,14 @@ class Motion:
             contacts=None if self.contacts is None else self.contacts[:, [2, 3, 0, 1]],
         )
 
+    def retarget(
+        self, skeleton: Skeleton | None = None, *, reference: Motion | None = None
+    ) -> Motion:
+        """The motion on another skeleton (None: the canonical one), see `motionlab.retarget`."""
+        from .retarget import retarget
+
+        return retarget(self, skeleton, reference=reference)
+
     def numpy(self) -> tuple[np.ndarray, np.ndarray]:
         """Copies of root positions (frames, 3) and rotations (frames, joints, 3, 3) in numpy."""
         return tuple(t.numpy(force=True).copy() for t in (self.root_positions, self.rotations))

@@ -31,7 +31,7 @@ def performances():
 
 
 def test_names():
-    assert datasets.names() == ["gaits", "examples", *SIZES]
+    assert datasets.names() == ["gaits", "examples", "locomotion", *SIZES]
 
 
 @pytest.mark.parametrize("name", SIZES)

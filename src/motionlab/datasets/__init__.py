@@ -1,8 +1,9 @@
-"""Named data sets: real motion capture, fetched, checked and cached; and procedural gaits.
+"""Named data sets: real motion capture, fetched, checked and cached; its locomotion on
+one skeleton; and procedural gaits.
 
 >>> from motionlab import datasets
->>> datasets.names()
-['gaits', 'examples', 'bandai-locomotion', 'bandai-actions', 'aclstm-cmu', 'accad', 'cmu']
+>>> datasets.names()[:5]
+['gaits', 'examples', 'locomotion', 'bandai-locomotion', 'bandai-actions']
 """
 
 from .loader import from_folder, load

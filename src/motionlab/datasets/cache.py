@@ -26,13 +26,16 @@ from .files import cache_folder
 from .registry import Clip, sources
 
 # Raise this when reading or packing changes, so that old files are made anew.
-FORMAT = 1
+FORMAT = 2
 
 
-def key(clips: Sequence[Clip]) -> str:
-    """Hash of everything that decides what the parsed clips look like."""
+def key(clips: Sequence[Clip], process: int = 0) -> str:
+    """Hash of everything that decides what the clips look like.
+
+    process : the number of what was done to them after reading, 0 for nothing.
+    """
     facts = [(c.source, c.path, c.sha256, c.fps, c.skip, sources()[c.source].units) for c in clips]
-    return hashlib.sha256(json.dumps([FORMAT, facts]).encode()).hexdigest()
+    return hashlib.sha256(json.dumps([FORMAT, process, facts]).encode()).hexdigest()
 
 
 def pack(motions: Sequence[Motion]) -> dict[str, np.ndarray]:
@@ -43,6 +46,8 @@ def pack(motions: Sequence[Motion]) -> dict[str, np.ndarray]:
     skeletons: dict[str, int] = {}
     which = [skeletons.setdefault(_to_json(m.skeleton), len(skeletons)) for m in motions]
     quaternions = [roma.rotmat_to_unitquat(m.rotations.double()).float() for m in motions]
+    labelled = motions and all(m.contacts is not None for m in motions)
+    contacts = torch.cat([m.contacts for m in motions]) if labelled else torch.zeros(0, 4)
     return {
         "skeletons": np.array(list(skeletons)),
         "skeleton": np.array(which, dtype=np.int64),
@@ -50,6 +55,7 @@ def pack(motions: Sequence[Motion]) -> dict[str, np.ndarray]:
         "fps": np.array([m.fps for m in motions], dtype=np.float64),
         "roots": torch.cat([m.root_positions for m in motions]).numpy(),
         "quaternions": torch.cat([q.reshape(-1, 4) for q in quaternions]).numpy(),
+        "contacts": contacts.bool().numpy(),  # empty if a motion has none
     }
 
 
@@ -61,6 +67,9 @@ def unpack(arrays: dict[str, np.ndarray], names: Sequence[tuple[str, str]]) -> l
     rotations = roma.unitquat_to_rotmat(torch.from_numpy(arrays["quaternions"]))
     rotations = rotations.split([f * j for f, j in zip(frames, joints, strict=True)])
     roots = torch.from_numpy(arrays["roots"]).split(frames)
+    contacts = [None] * len(frames)
+    if len(arrays["contacts"]):
+        contacts = torch.from_numpy(arrays["contacts"]).split(frames)
     return [
         Motion(
             skeletons[which],
@@ -69,20 +78,27 @@ def unpack(arrays: dict[str, np.ndarray], names: Sequence[tuple[str, str]]) -> l
             fps,
             name=name,
             source=source,
+            contacts=contact,
         )
-        for which, root, rotation, fps, (source, name) in zip(
-            arrays["skeleton"].tolist(), roots, rotations, arrays["fps"], names, strict=True
+        for which, root, rotation, contact, fps, (source, name) in zip(
+            arrays["skeleton"].tolist(),
+            roots,
+            rotations,
+            contacts,
+            arrays["fps"],
+            names,
+            strict=True,
         )
     ]
 
 
-def read(label: str, clips: Sequence[Clip]) -> list[Motion] | None:
+def read(label: str, clips: Sequence[Clip], process: int = 0) -> list[Motion] | None:
     """The parsed clips, None if they are not cached, outdated or damaged."""
     path = cache_folder() / "parsed" / f"{label}.npz"
     try:
         # opened here, as np.load leaves a damaged file open
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            if str(file["key"]) != key(clips):
+            if str(file["key"]) != key(clips, process):
                 return None
             arrays = {name: file[name] for name in file.files}
         return unpack(arrays, [(clip.source, clip.name) for clip in clips])
@@ -91,14 +107,16 @@ def read(label: str, clips: Sequence[Clip]) -> list[Motion] | None:
         return None  # whatever is wrong with a cache file: it is made anew
 
 
-def write(label: str, clips: Sequence[Clip], arrays: dict[str, np.ndarray]) -> None:
+def write(
+    label: str, clips: Sequence[Clip], arrays: dict[str, np.ndarray], process: int = 0
+) -> None:
     """Keep packed clips; the file appears whole or not at all. Warns if it can't be written."""
     path = cache_folder() / "parsed" / f"{label}.npz"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent) as folder:
             whole = os.path.join(folder, "whole.npz")
-            np.savez(whole, key=np.array(key(clips)), **arrays)
+            np.savez(whole, key=np.array(key(clips, process)), **arrays)
             os.replace(whole, path)
     except OSError as error:
         warnings.warn(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,17 @@ from ..errors import BvhError, DataError
 from ..io.bvh import parse_bvh, read_bvh
 from ..motion import Motion
 from . import cache, files
-from .registry import EXAMPLES, GAITS, Clip, check_name, check_split, check_wanted, choose, sources
+from .registry import (
+    EXAMPLES,
+    GAITS,
+    LOCOMOTION,
+    Clip,
+    check_name,
+    check_split,
+    check_wanted,
+    choose,
+    sources,
+)
 from .splits import assign
 
 
@@ -38,6 +48,8 @@ def load(
     split: str | None = None,
     *,
     clips: Sequence[str] | None = None,
+    mirrored: bool = False,
+    permissive: bool = False,
     download: bool | None = None,
 ) -> list[Motion]:
     """Clips of a named data set.
@@ -47,6 +59,9 @@ def load(
     name : one of `names()`. "gaits" is made on the spot and needs neither files nor network.
     split : "train", "val" or "test"; None for all.
     clips : names of the clips wanted, as `table(name)` lists them; None for all.
+    mirrored : after the clips, their mirrored copies as well, with "_mirrored" after their names.
+        They are of the same split as the clips.
+    permissive : leave out clips whose licence forbids commercial use.
     download : None downloads what is missing if it is at most 10 MB, True any size, False nothing.
 
     Files are looked for in the folder that the environment variable MOTIONLAB_DATA names, then in
@@ -62,14 +77,22 @@ def load(
     """
     check_name(name)
     if name == GAITS:
-        return _gaits(split, clips)
-    wanted = choose(name, split, clips)
+        motions = _gaits(split, clips)
+    else:
+        motions = _from_files(name, choose(name, split, clips, permissive), download)
+    if mirrored:
+        motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
+    return motions
+
+
+def _from_files(name: str, wanted: Sequence[Clip], download: bool | None) -> list[Motion]:
     files.data_folder()  # complain of a wrong MOTIONLAB_DATA even if nothing is read from it
+    process, prepare = _process(name, download)
     motions: dict[Clip, Motion] = {}
     to_parse: dict[str, list[Clip]] = {}
     for label, members in _cached_together(name).items():
         some = set(wanted).intersection(members)
-        cached = cache.read(label, members) if some else None
+        cached = cache.read(label, members, process) if some else None
         if cached is not None:
             motions.update(zip(members, cached, strict=True))
         elif some:
@@ -77,19 +100,32 @@ def load(
     files.get(name, [clip for some in to_parse.values() for clip in some], download)
     with _progress(f"reading {name}", sum(map(len, to_parse.values()))) as bar:
         for label, some in to_parse.items():
-            arrays = cache.pack([_parse(clip, data, bar) for clip, data in files.read(some)])
+            parsed = [prepare(_parse(clip, data, bar)) for clip, data in files.read(some)]
+            arrays = cache.pack(parsed)
             if some == _cached_together(name)[label]:
-                cache.write(label, some, arrays)
+                cache.write(label, some, arrays, process)
             names = [(clip.source, clip.name) for clip in some]
             motions.update(zip(some, cache.unpack(arrays, names), strict=True))
     return [motions[clip] for clip in wanted]
+
+
+def _process(name: str, download: bool | None) -> tuple[int, Callable[[Motion], Motion]]:
+    """What is done to clips after reading: its number, for the cache, and a function."""
+    if name != LOCOMOTION:
+        return 0, lambda motion: motion
+    from . import locomotion
+
+    return locomotion.FORMAT, lambda motion: locomotion.bring(motion, download)
 
 
 def _cached_together(name: str) -> dict[str, list[Clip]]:
     """The clips of a data set by the cache file that they are in: one a split, for speed."""
     groups: dict[str, list[Clip]] = {}
     for clip in choose(name):
-        groups.setdefault(name if name == EXAMPLES else f"{name}-{clip.split}", []).append(clip)
+        label = f"{name}-{clip.split}"
+        if name == LOCOMOTION:
+            label += f"-{clip.source}"
+        groups.setdefault(name if name == EXAMPLES else label, []).append(clip)
     return groups
 
 

@@ -20,7 +20,9 @@ from .splits import SPLITS
 if TYPE_CHECKING:
     import pandas as pd
 
-GAITS, EXAMPLES = "gaits", "examples"
+GAITS, EXAMPLES, LOCOMOTION = "gaits", "examples", "locomotion"
+MIXED = (EXAMPLES, LOCOMOTION)  # of clips of several sources
+LOCOMOTION_FPS = 30
 # of `table`
 COLUMNS = [
     "source",
@@ -32,6 +34,7 @@ COLUMNS = [
     "fps",
     "seconds",
     "bytes",
+    "licence",
     "performance",
     "path",
     "url",
@@ -81,6 +84,15 @@ class Clip:
     def url(self) -> str:
         return sources()[self.source].url + quote(self.path)
 
+    @property
+    def licence(self) -> str:
+        return _licence(sources()[self.source])
+
+    @property
+    def commercial(self) -> bool:
+        """Whether the licence allows commercial use."""
+        return sources()[self.source].commercial
+
 
 def clip_name(path: str) -> str:
     """The file's name without .bvh; a bare number takes its folder's name in front."""
@@ -122,7 +134,7 @@ def clips() -> tuple[Clip, ...]:
 
 def names() -> list[str]:
     """Names that `load`, `info` and `table` know."""
-    return [GAITS, EXAMPLES, *sources()]
+    return [GAITS, EXAMPLES, LOCOMOTION, *sources()]
 
 
 def check_name(name: str) -> None:
@@ -141,11 +153,19 @@ def members(name: str) -> list[Clip]:
     if name == EXAMPLES:
         by_name = {f"{clip.source}/{clip.name}": clip for clip in clips()}
         return [by_name[key] for key in _toml()[EXAMPLES]["clips"]]
+    if name == LOCOMOTION:
+        listed = set(_text("locomotion.tsv").splitlines()[1:])
+        return [clip for clip in clips() if f"{clip.source}\t{clip.path}" in listed]
     return [clip for clip in clips() if clip.source == name]
 
 
-def choose(name: str, split: str | None = None, wanted: Sequence[str] | None = None) -> list[Clip]:
-    """Members of a data set, of one split, or those wanted by name.
+def choose(
+    name: str,
+    split: str | None = None,
+    wanted: Sequence[str] | None = None,
+    permissive: bool = False,
+) -> list[Clip]:
+    """Members of a data set, of one split, those wanted by name, those free for commercial use.
 
     Raises
     ------
@@ -156,7 +176,11 @@ def choose(name: str, split: str | None = None, wanted: Sequence[str] | None = N
     if wanted is not None:
         chosen = check_wanted(wanted, [clip.name for clip in found], name)
         found = [clip for clip in found if clip.name in chosen]
-    return [clip for clip in found if split in (None, clip.split)]
+    return [
+        clip
+        for clip in found
+        if split in (None, clip.split) and (clip.commercial or not permissive)
+    ]
 
 
 def check_wanted(wanted: Iterable[str], known: Iterable[str], name: str) -> set[str]:
@@ -246,16 +270,16 @@ def info(name: str) -> Info:
             home="",
             quirks=("Made by motionlab.datasets.gaits; needs no file and no network.",),
         )
-    if name == EXAMPLES:
+    if name in MIXED:
         used = [sources()[source] for source in dict.fromkeys(c.source for c in members(name))]
         return Info(
             **about,
-            title=_toml()[EXAMPLES]["title"],
+            title=_toml()[EXAMPLES]["title"] if name == EXAMPLES else _LOCOMOTION_TITLE,
             licence="; ".join(f"{s.name}: {_licence(s)}" for s in used),
             commercial=all(s.commercial for s in used),
             citation="as the sources: " + ", ".join(s.name for s in used),
             home="",
-            quirks=(),
+            quirks=() if name == EXAMPLES else _LOCOMOTION_QUIRKS,
         )
     source = sources()[name]
     return Info(
@@ -269,6 +293,13 @@ def info(name: str) -> Info:
     )
 
 
+_LOCOMOTION_TITLE = "Walking, running, turning, starting, stopping on the canonical skeleton"
+_LOCOMOTION_QUIRKS = (
+    "Retargeted and resampled to 30 frames per second when first loaded, which takes minutes.",
+    "Speeds are scaled as the legs are: by 0.87 for accad.",
+)
+
+
 def _licence(source: Source) -> str:
     return source.licence + ("" if source.commercial else " (non-commercial)")
 
@@ -276,8 +307,8 @@ def _licence(source: Source) -> str:
 def table(name: str | None = None) -> pd.DataFrame:
     """Clips as a pandas DataFrame, one row each; of all sources, or of one data set.
 
-    Columns: source, name, action, style, split, frames, fps, seconds, bytes, performance, path,
-    url. Needs no data.
+    Columns: source, name, action, style, split, frames, fps, seconds, bytes, licence, performance,
+    path, url. Needs no data.
 
     Raises
     ------
@@ -288,8 +319,16 @@ def table(name: str | None = None) -> pd.DataFrame:
     if name == GAITS:
         return pd.DataFrame(_gait_rows(), columns=COLUMNS)
     found = clips() if name is None else members(name)
+    if name == LOCOMOTION:
+        found = [_resampled(clip) for clip in found]
     rows = [[getattr(clip, column) for column in COLUMNS] for clip in found]
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _resampled(clip: Clip) -> Clip:
+    """A clip as the data set "locomotion" has it."""
+    frames = -(-clip.frames * LOCOMOTION_FPS // round(clip.fps))
+    return replace(clip, frames=frames, fps=float(LOCOMOTION_FPS))
 
 
 def _gait_rows() -> list[dict]:
@@ -306,6 +345,7 @@ def _gait_rows() -> list[dict]:
             "fps": motion.fps,
             "seconds": motion.seconds,
             "bytes": 0,
+            "licence": "MIT",
             "performance": motion.name,
             "path": "",
             "url": "",
