@@ -10,6 +10,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 READ_WHEN_IT_RUNS = {
     "motionlab/datasets/clips.tsv",
+    "motionlab/datasets/locomotion.tsv",
+    "motionlab/encodings/mean_pose.json",
     "motionlab/datasets/gaits.json",
     "motionlab/datasets/sources.toml",
     "motionlab/viewer/scene.html",
