@@ -200,6 +200,10 @@ class Skeleton:
             self.rotation_orders,
         )
 
+    def without_end_sites(self) -> Skeleton:
+        """The joints alone: what an encoding or a file without tips describes."""
+        return Skeleton(self.names, self.parents, self.offsets, (), (), self.rotation_orders)
+
     def _end_partners(self, partners: Sequence[int]) -> list[int]:
         """For each end site the one in the same place on the partner of its joint."""
         seen: Counter[int] = Counter()

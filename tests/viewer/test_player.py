@@ -265,3 +265,8 @@ def test_lists_labels_paths_and_trails_arrive():
     assert sent["trail"] == [CANONICAL.index("left_hand"), 0]
     assert [(p["track"], p["points"][0]) for p in sent["paths"]] == [(0, [0, 0]), (1, [1, 1])]
     player.close()
+
+
+def test_joints_alone_are_shown_too():
+    joints = standing(5).positions()[:, : CANONICAL.joints]
+    assert show(joints, skeleton=CANONICAL, fps=30).payload["tracks"][0]["points"] == 21

@@ -83,3 +83,35 @@ def test_a_path_is_named_where_it_is_farthest_from_the_start(walk):
 def test_what_cannot_be_drawn_is_said(walk, call, message):
     with pytest.raises(ViewerError, match=message):
         call(walk)
+
+
+def test_a_disc_for_every_value_and_equal_keys_in_the_legend():
+    (axes,) = plots.scatter({"a": ([1, 2], [3, 4], [1, 9]), "b": ([5], [6], [3])}, "x", "y").axes
+    first, second = axes.collections
+    assert first.get_offsets().tolist() == [[1, 3], [2, 4]]
+    assert first.get_sizes()[1] > second.get_sizes()[0] > first.get_sizes()[0]
+    keys = [handle.get_sizes()[0] for handle in axes.get_legend().legend_handles]
+    assert keys[0] == keys[1]
+
+
+def test_values_over_time_are_in_seconds():
+    (axes,) = plots.over_time({"left": [1, 2, 3], "right": [3, np.nan, 1]}, fps=10, y="cm").axes
+    assert np.allclose(axes.lines[0].get_xdata(), [0, 0.1, 0.2])
+    assert np.isnan(axes.lines[1].get_ydata()[1])
+
+
+def test_feature_maps_name_their_parts():
+    maps = {"one": np.zeros((5, 4)), "two": np.ones((5, 6))}
+    groups = {name: {"root": slice(0, 2), "pose": slice(2, 4)} for name in maps}
+    one, two, _ = plots.feature_maps(maps, 10, groups).axes
+    assert one.images[0].get_array().shape == (4, 5)
+    assert [label.get_text() for label in two.get_yticklabels()] == ["root", "pose"]
+    assert one.images[0].get_extent()[1] == 0.5
+
+
+def test_a_fan_draws_every_path_and_the_true_one():
+    paths = np.random.default_rng(0).normal(size=(7, 20, 2))
+    left, right = plots.fan({"steps": paths, "turns": paths}, truth=paths[0]).axes
+    assert len(left.lines) == len(right.lines) == 8
+    assert np.allclose(left.lines[3].get_xydata(), paths[3])
+    assert left.get_xlim() == right.get_xlim()

@@ -98,7 +98,7 @@ def _name_joints(axes, skeleton, x: np.ndarray, y: np.ndarray) -> None:
 
 
 @styled
-def bars(values: Sequence[float], names: Sequence[str], label: str) -> Figure:
+def bars(values: Sequence[float], names: Sequence[str], label: str, log: bool = False) -> Figure:
     """One bar a name, in the given order; `label` names the quantity with its unit."""
     values, names = np.asarray(values, dtype=float), list(names)
     if values.shape != (len(names),):
@@ -111,6 +111,9 @@ def bars(values: Sequence[float], names: Sequence[str], label: str) -> Figure:
     axes.invert_yaxis()
     axes.set_xlabel(label)
     axes.grid(axis="y", visible=False)
+    if log:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
     return figure
 
 
@@ -133,6 +136,94 @@ def curves(
         axes.yaxis.set_major_formatter("{x:g}")
     axes.set(xlabel=x, ylabel=y)
     axes.legend()
+    return figure
+
+
+@styled
+def scatter(
+    groups: Mapping[str, tuple[Sequence[float], Sequence[float], Sequence[float]]], x: str, y: str
+) -> Figure:
+    """Named clouds of discs ``{name: (xs, ys, sizes)}``; the largest size gives a disc of 1 cm."""
+    figure, axes = plt.subplots(figsize=(7, 4.2))
+    largest = max(float(np.max(sizes)) for *_, sizes in groups.values())
+    for index, (name, (xs, ys, sizes)) in enumerate(groups.items()):
+        areas = 8 + 600 * np.asarray(sizes, dtype=float) / largest
+        color = palette.color(name, index)
+        axes.scatter(xs, ys, s=areas, color=color, alpha=0.55, lw=0, label=name)
+    axes.set(xlabel=x, ylabel=y)
+    legend = axes.legend()
+    for handle in legend.legend_handles:
+        handle.set_sizes([60])  # not that of the first disc
+    return figure
+
+
+@styled
+def over_time(lines: Mapping[str, Sequence[float]], fps: float, y: str) -> Figure:
+    """Named lines of one value a frame, over seconds; frames that are NaN leave a gap."""
+    figure, axes = plt.subplots(figsize=(7.5, 3.2))
+    for index, (name, values) in enumerate(lines.items()):
+        values = np.asarray(values, dtype=float)
+        color = palette.color(name, index)
+        axes.plot(np.arange(len(values)) / fps, values, label=name, color=color)
+    axes.set(xlabel="time (s)", ylabel=y)
+    if len(lines) > 1:
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=len(lines))
+    return figure
+
+
+@styled
+def feature_maps(maps: Mapping[str, Sequence], fps: float, groups: Mapping[str, Mapping]) -> Figure:
+    """What a network sees: features as rows of colour over time, one picture a name.
+
+    Parameters
+    ----------
+    maps : {name: normalised features (frames, dim)}; red is above the mean, blue below.
+    fps : frames per second.
+    groups : {name: {what: slice}}, the rows that belong together, as an encoding's `slices`.
+    """
+    heights = [np.shape(features)[1] for features in maps.values()]
+    figure, rows = plt.subplots(
+        len(maps), 1, figsize=(7.5, 0.8 + 0.035 * sum(heights)), sharex=True,
+        height_ratios=heights, squeeze=False, layout="constrained",
+    )  # fmt: skip
+    for axes, (name, features) in zip(rows[:, 0], maps.items(), strict=True):
+        features = np.asarray(features)
+        extent = (0, len(features) / fps, features.shape[1], 0)
+        look = dict(cmap="RdBu_r", vmin=-2.5, vmax=2.5, interpolation="nearest")
+        image = axes.imshow(features.T, aspect="auto", extent=extent, **look)
+        middles = []
+        for part in groups[name].values():
+            middles.append((part.start + part.stop) / 2)
+            axes.axhline(part.start, color=INK, lw=0.8)
+        axes.set_yticks(middles, groups[name], fontsize=8)
+        axes.set_title(f"{name}: {features.shape[1]} numbers a frame", fontsize=10, loc="left")
+        axes.grid(visible=False)
+    rows[-1, 0].set_xlabel("time (s)")
+    figure.colorbar(image, ax=rows, label="standard deviations from the mean", shrink=0.6)
+    return figure
+
+
+@styled
+def fan(paths: Mapping[str, Sequence], truth: Sequence | None = None) -> Figure:
+    """Many paths over the ground from one start, seen from above.
+
+    Parameters
+    ----------
+    paths : {name: (n, frames, 2) metres, x and z}; one picture each, all at one scale.
+    truth : (frames, 2) metres, drawn over each.
+    """
+    figure, panels = plt.subplots(
+        1, len(paths), figsize=(7.5, 4), sharex=True, sharey=True, squeeze=False
+    )
+    for index, (axes, (name, many)) in enumerate(zip(panels[0], paths.items(), strict=True)):
+        color = palette.color(name, index)
+        for path in np.asarray(many):
+            axes.plot(*path.T, color=color, lw=0.8, alpha=0.5)
+        if truth is not None:
+            axes.plot(*np.asarray(truth).T, color=INK, lw=2.5)
+        axes.set_title(name, fontsize=10)
+        axes.set(xlabel="x (m)", aspect="equal")
+    panels[0, 0].set_ylabel("z (m)")
     return figure
 
 

@@ -51,7 +51,8 @@ def show(
 
     Parameters
     ----------
-    motion : a `Motion`, point positions (frames, points, 3) in metres, or a list of either.
+    motion : a `Motion`, point positions (frames, points, 3) in metres, or a list of either. Points
+        may be the joints alone.
     labels : what to call each motion; by default the motions' names.
     contacts : True to mark the feet by the motions' own labels, or bool (frames, 4) arrays.
     paths : a path (n, 2) of x, z or (n, 3) of points in metres, or a list of paths, on the ground.
@@ -147,6 +148,8 @@ def _track(
                 "show(points, skeleton=motion.skeleton, fps=30)."
             )
         positions, bones = motion, skeleton
+        if positions.shape[1] == bones.joints != bones.points:  # as the encoding BodyFrame gives
+            bones = bones.without_end_sites()
         if positions.shape[1] != bones.points:
             raise ViewerError(
                 f"show: motion {index} has {positions.shape[1]} points, its skeleton has "
