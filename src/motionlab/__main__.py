@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
 
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
@@ -32,7 +33,7 @@ class List:
                 clips = registry.members(name)
                 count = len(clips) - len(files.missing(clips))
                 here = "yes" if count == len(clips) else f"{count}/{len(clips)}" if count else "no"
-            licence = "as the sources" if name == registry.EXAMPLES else about.licence
+            licence = "as the sources" if name in registry.MIXED else about.licence
             print(
                 f"{name:18} {about.clips:5} {about.minutes:7.1f} {about.bytes / 1e6:6.1f}  "
                 f"{here:9} {licence}"
@@ -143,7 +144,85 @@ class Version:
               f"{platform.platform()}")  # fmt: skip
 
 
-COMMANDS = Annotated[Data, subcommand("data")] | Annotated[Version, subcommand("version")]
+@dataclass
+class Prepare:
+    """Make motion ready for training: one file of features, splits and normaliser."""
+
+    source: Positional[Annotated[str, arg(metavar="NAME|FOLDER")]]
+    """Data set, as `data list` names it, or a folder of BVH files."""
+    out: Path | None = None
+    """File to write; runs/NAME.npz if left out."""
+
+    def run(self) -> None:
+        from .training import prepare
+        from .training.prepared import file_of
+
+        out = self.out or file_of(self.source)
+        prepared = prepare(self.source, progress=True)
+        prepared.save(out)
+        print(f"{out}: {len(prepared.names)} clips, {len(prepared.features)} frames, "
+              f"hash {prepared.hash[:12]}")  # fmt: skip
+
+
+@dataclass
+class Train:
+    """Train a model; started again, it goes on where it was stopped."""
+
+    model: Positional[Literal["lstm-gmm", "lstm-gmm-contacts"]]
+    """Which model, without or with contact channels."""
+    preset: Literal["smoke", "table", "ship", "paper"] = "table"
+    """How long and how large; see motionlab.training.presets."""
+    data: Annotated[str, arg(metavar="NAME|FOLDER|FILE")] = "locomotion"
+    """Data set, folder of BVH files, or what `prepare` wrote."""
+    start: Annotated[Path | None, arg(name="from", metavar="WEIGHTS")] = None
+    """Weights to begin with, for fine-tuning."""
+    out: Path | None = None
+    """Folder to write to; runs/MODEL-PRESET if left out."""
+    updates: int | None = None
+    """Other number of updates than the preset's, also for a training under way."""
+    learning_rate: float | None = None
+    """Other learning rate than the preset's."""
+    seed: int | None = None
+    """Other seed than the preset's."""
+    accelerator: str = "auto"
+    """cpu, cuda, mps."""
+    devices: int = 1
+    """Processes, one a device."""
+    nodes: int = 1
+    """Machines."""
+
+    def run(self) -> None:
+        from .training import PRESETS, Prepared, build
+
+        try:
+            from .training.loop import train
+        except ModuleNotFoundError as error:
+            raise MotionLabError(
+                f"Training needs {error.name}: pip install 'motionlab[train]'."
+            ) from error
+        chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
+        chosen = {key: value for key, value in chosen.items() if value is not None}
+        preset = replace(PRESETS[self.model][self.preset], **chosen)
+        data = Prepared.find(self.data)
+        if self.model == "lstm-gmm":
+            data = data.without_contacts()
+        model = build(data, preset, self.start)
+        out = self.out or Path("runs") / f"{self.model}-{self.preset}"
+        curve = train(
+            model, data, preset, out, name=self.model, accelerator=self.accelerator,
+            devices=self.devices, nodes=self.nodes, progress=True,
+        )  # fmt: skip
+        best = min(curve, key=lambda point: point["val"])
+        print(f"{out}: {curve[-1]['update']} updates; best of validation {best['val']:.3f} at "
+              f"update {best['update']}, in best.safetensors")  # fmt: skip
+
+
+COMMANDS = (
+    Annotated[Data, subcommand("data")]
+    | Annotated[Prepare, subcommand("prepare")]
+    | Annotated[Train, subcommand("train")]
+    | Annotated[Version, subcommand("version")]
+)
 
 
 def _confirm() -> None:

@@ -1,0 +1,11 @@
+"""Recurrent models of motion, one file each.
+
+Each keeps the same contract: ``observe(features)`` gives a state, ``step(x, state)`` goes on by one
+frame, ``generate(n, start)`` by many, and what is generative has ``log_prob``. Features are in raw
+units, as an encoding makes them; a state is a named tuple of tensors, batch first, so that nothing
+is hidden in the model.
+"""
+
+from .lstm_gmm import LstmGmm, Mixture, State
+
+__all__ = ["LstmGmm", "Mixture", "State"]

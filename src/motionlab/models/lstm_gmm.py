@@ -1,0 +1,257 @@
+"""The generator of RNN-GAN: an LSTM that answers "what comes next?" with a mixture of Gaussians.
+
+Wang, Chai and Xia (2021), *Combining Recurrent Neural Networks and Adversarial Training for Human
+Motion Synthesis and Control*, section 4.1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from .. import encodings
+from ..encodings import Encoding, Normalizer
+from ..errors import ModelError
+
+# Smallest standard deviations, in normalised units. A contact is 0 or 1: a Gaussian around such a
+# value could be made as narrow, and its density as high, as one likes. With 0.1 a contact that the
+# network was sure of and got wrong costs about 200 nats.
+_FLOOR, _CONTACT_FLOOR = 0.01, 0.1
+
+
+class State(NamedTuple):
+    """All that the network knows after it has seen a frame (the conditions of eq. 5)."""
+
+    frame: Tensor  # (batch, dim), the last input frame, raw units
+    hidden: Tensor  # (batch, 2, width), h of both LSTM layers
+    cell: Tensor  # (batch, 2, width), C of both LSTM layers
+
+
+class Mixture(NamedTuple):
+    """Gaussians with diagonal covariance (eq. 6) over the next frame, in normalised units."""
+
+    log_weights: Tensor  # (..., M), logarithm of weights that sum to 1
+    means: Tensor  # (..., M, kept)
+    stds: Tensor  # (..., M, kept)
+
+    def log_prob(self, values: Tensor) -> Tensor:
+        """Logarithm of the density (...) at values (..., kept).
+
+        The sum over components is a log-sum-exp: densities of 70 channels under- and overflow.
+        """
+        far = (values[..., None, :] - self.means) / self.stds  # (..., M, kept)
+        each = -(far.square() / 2 + self.stds.log() + math.log(2 * math.pi) / 2).sum(-1)  # (..., M)
+        return (self.log_weights + each).logsumexp(-1)
+
+    def sample(
+        self,
+        generator: torch.Generator | None = None,
+        temperature: float = 1.0,
+        component_temperature: float = 1.0,
+    ) -> Tensor:
+        """One draw (..., kept): first a component, then a point from its Gaussian.
+
+        temperature : factor on the standard deviations.
+        component_temperature : divides the logarithms of the weights; towards 0 the likeliest
+            component always wins.
+        """
+        shape, kept = self.log_weights.shape, self.means.shape[-1]
+        chances = (self.log_weights / component_temperature).softmax(-1)
+        chosen = torch.multinomial(chances.flatten(0, -2), 1, generator=generator)  # (all, 1)
+        chosen = chosen.reshape(*shape[:-1], 1, 1).expand(*shape[:-1], 1, kept)
+        mean = self.means.gather(-2, chosen)[..., 0, :]
+        std = self.stds.gather(-2, chosen)[..., 0, :]
+        return mean + temperature * std * _normal(std, generator)
+
+
+class LstmGmm(nn.Module):
+    """FC - FC - LSTM - LSTM - FC (RNN-GAN, fig. 3): the distribution of the next frame.
+
+    Why a distribution? From one pose a person may go on in many ways. A network that must name one
+    frame answers with the average of them, and the average of a left and a right step is standing
+    still. A mixture of M Gaussians says "this, or that, and by so much", and whoever samples from
+    it gets one of the ways, another one each time.
+
+    Why an LSTM? One frame tells neither how fast the body moves nor where in the stride it is; the
+    two LSTM layers carry along what has been seen.
+
+    Features go in and come out in raw units. Inside they are normalised; likelihoods and noise are
+    in normalised units.
+
+    Parameters
+    ----------
+    encoding : what a row of features means.
+    normalizer : fitted on the training split.
+    width : of each hidden layer (the paper's is not known).
+    components : M, Gaussians in the mixture.
+    """
+
+    def __init__(
+        self, encoding: Encoding, normalizer: Normalizer, width: int = 512, components: int = 5
+    ) -> None:
+        super().__init__()
+        if len(normalizer.mean) != encoding.dim:
+            raise ModelError(
+                f"The normalizer is for {len(normalizer.mean)} channels, the encoding has "
+                f"{encoding.dim}; fit it on features of this encoding."
+            )
+        self.encoding, self.normalizer = encoding, normalizer
+        self.width, self.components, self.kept = width, components, len(normalizer.kept)
+        self.enter = nn.Sequential(
+            nn.Linear(self.kept, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
+        )
+        self.lstm = nn.LSTM(width, width, num_layers=2, batch_first=True)
+        self.leave = nn.Linear(width, components * (1 + 2 * self.kept))
+        floor = torch.full((encoding.dim,), _FLOOR)
+        if "contacts" in encoding.slices:
+            floor[encoding.slices["contacts"]] = _CONTACT_FLOOR
+        self.register_buffer("floor", floor[normalizer.kept])
+
+    @property
+    def fps(self) -> float:
+        """Frames per second of the features."""
+        return self.encoding.fps
+
+    # -- likelihood of whole clips ----------------------------------------------------------------
+
+    def forward(self, features: Tensor, noise: Tensor | None = None) -> Mixture:
+        """What may follow each frame of features (batch, frames, dim), starting from no memory.
+
+        noise : like features; added to what the network sees, in normalised units.
+        """
+        features = self._checked(features)
+        return self._run(features, self.zero_state(len(features)), noise)[0]
+
+    def log_prob(self, features: Tensor, noise: Tensor | None = None) -> Tensor:
+        """Log-likelihood (batch, frames - 1) of each frame but the first, given those before it."""
+        if self._checked(features).shape[1] < 2:
+            raise ModelError("log_prob needs at least 2 frames: the first one is given.")
+        before = None if noise is None else noise[:, :-1]
+        return self(features[:, :-1], before).log_prob(self.normalizer(features[:, 1:]))
+
+    def loss(self, features: Tensor, noise: Tensor | None = None) -> Tensor:
+        """Mean negative log-likelihood a frame (eq. 8), in nats."""
+        return -self.log_prob(features, noise).mean()
+
+    def _run(self, features: Tensor, state: State, noise: Tensor | None) -> tuple[Mixture, State]:
+        inputs = self.normalizer(features)  # (batch, frames, kept)
+        if noise is not None:
+            inputs = inputs + noise[..., self.normalizer.kept]
+        memory = (
+            state.hidden.transpose(0, 1).contiguous(),
+            state.cell.transpose(0, 1).contiguous(),
+        )
+        outputs, (hidden, cell) = self.lstm(self.enter(inputs), memory)  # (batch, frames, width)
+        after = State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1))
+        return self._mixture(outputs), after
+
+    def _mixture(self, outputs: Tensor) -> Mixture:
+        """Numbers of any size (..., width) to weights, means and deviations (eq. 7)."""
+        # densities need more digits than half precision has
+        with torch.autocast(outputs.device.type, enabled=False):
+            numbers = self.leave(outputs.to(self.leave.weight.dtype))
+        weights, gaussians = numbers.split([self.components, 2 * self.components * self.kept], -1)
+        means, log_stds = gaussians.unflatten(-1, (2, self.components, self.kept)).unbind(-3)
+        return Mixture(weights.log_softmax(-1), means, log_stds.exp() + self.floor)
+
+    # -- one frame after the other ----------------------------------------------------------------
+
+    def zero_state(self, batch: int = 1) -> State:
+        """The state of a network that has seen nothing; its frame is the mean frame."""
+        mean = self.normalizer.mean
+        memory = mean.new_zeros(batch, 2, self.width)
+        return State(mean.expand(batch, -1), memory, memory)
+
+    def observe(self, features: Tensor) -> State:
+        """The state after features (batch, frames, dim), or (frames, dim) for a batch of one."""
+        features = self._checked(features[None] if features.ndim == 2 else features)
+        return self._run(features, self.zero_state(len(features)), None)[1]
+
+    def predict(self, state: State) -> Mixture:
+        """What may follow the frames that a state has seen: (batch, M, ...)."""
+        return self._mixture(state.hidden[:, -1])
+
+    def step(self, x: Tensor, state: State, noise: Tensor | None = None) -> tuple[Mixture, State]:
+        """See one frame more, x (batch, dim): what may follow it, and the state after it."""
+        noise = None if noise is None else noise[:, None]
+        mixture, state = self._run(x[:, None], state, noise)
+        return Mixture(*(part[:, 0] for part in mixture)), state
+
+    def generate(
+        self,
+        n: int,
+        start: State,
+        *,
+        generator: torch.Generator | None = None,
+        temperature: float = 1.0,
+        component_temperature: float = 1.0,
+        noise: float = 0.0,
+    ) -> Tensor:
+        """Motion that goes on from a state: n frames (batch, n, dim), each fed back to get the next.
+
+        Parameters
+        ----------
+        n : frames.
+        start : from `observe`; the batch is as large as it.
+        generator : source of chance, on the model's device.
+        temperature : factor on the standard deviations; 1 is what was learned, less is calmer.
+        component_temperature : the same for the choice among the M components.
+        noise : standard deviation of what is added to the network's inputs, in normalised units
+            (the d of section 5.1; 0.05 in training).
+
+        Raises
+        ------
+        ModelError : n is not a positive number, or a temperature is not above zero.
+        """
+        if n < 1:
+            raise ModelError(f"generate: {n} frames; ask for 1 or more.")
+        for what, value in [("temperature", temperature), ("component_temperature",
+                            component_temperature)]:  # fmt: skip
+            if not 0 < value < float("inf"):
+                raise ModelError(f"generate: {what} is {value}; it must be a number above 0.")
+        mixture, state, frames = self.predict(start), start, []
+        for _ in range(n):
+            x = self.normalizer.inverse(
+                mixture.sample(generator, temperature, component_temperature)
+            )
+            frames.append(x)
+            disturbance = noise * _normal(x, generator) if noise else None
+            mixture, state = self.step(x, state, disturbance)
+        return torch.stack(frames, dim=1)
+
+    # -- what is stored with the weights ----------------------------------------------------------
+
+    def config(self) -> dict:
+        """What `from_config` needs to build an untrained copy; fit for JSON."""
+        return {
+            "encoding": self.encoding.config(),
+            "kept": self.kept,
+            "width": self.width,
+            "components": self.components,
+        }
+
+    @classmethod
+    def from_config(cls, config: dict) -> LstmGmm:
+        """A model of the right shapes, to be filled by `load_state_dict`."""
+        encoding = encodings.from_config(config["encoding"])
+        normalizer = Normalizer(encoding.dim, config["kept"])
+        return cls(encoding, normalizer, config["width"], config["components"])
+
+    def _checked(self, features: Tensor) -> Tensor:
+        shape = tuple(features.shape)
+        if len(shape) != 3 or shape[-1] != self.encoding.dim or 0 in shape:
+            raise ModelError(
+                f"Features have shape {shape}; this model needs (batch, frames, "
+                f"{self.encoding.dim}) with at least one frame."
+            )
+        if not features.detach().sum().isfinite():
+            raise ModelError("Features hold a NaN or infinite value; cut such frames out first.")
+        return features
+
+
+def _normal(like: Tensor, generator: torch.Generator | None) -> Tensor:
+    """Standard normal numbers, as many as `like` has."""
+    return torch.randn(like.shape, generator=generator, device=like.device, dtype=like.dtype)

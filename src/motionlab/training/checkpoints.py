@@ -1,0 +1,126 @@
+"""Weights and half-done trainings in files that are whole, or not there, whenever one looks.
+
+Both are safetensors files: plain arrays and a header of JSON text. Reading one runs no code, as
+unpickling would.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO
+
+import safetensors
+import safetensors.torch
+import torch
+from torch import Tensor, nn
+
+from ..errors import MotionLabError, TrainingError
+from ..models import LstmGmm
+
+_KINDS = {kind.__name__: kind for kind in (LstmGmm,)}
+
+
+def write_whole(path: str | os.PathLike, write: Callable[[IO[bytes]], object]) -> None:
+    """Let `write` fill a file that appears under its name only when it is complete and on disk.
+
+    Whoever is killed meanwhile leaves the old file untouched. Raises OSError.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.part")
+    try:
+        with part.open("wb") as stream:
+            write(stream)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def save_weights(path: str | os.PathLike, model: nn.Module, about: dict) -> None:
+    """Weights, with what is needed to build the model again, and what is worth knowing about them.
+
+    Raises
+    ------
+    TrainingError : the file can't be written.
+    """
+    header = {"kind": type(model).__name__, "config": model.config(), "about": about}
+    _save(path, model.state_dict(), header)
+
+
+def load_weights(path: str | os.PathLike) -> tuple[nn.Module, dict]:
+    """The model that `save_weights` stored, on the CPU, and what was said about it.
+
+    Raises
+    ------
+    TrainingError : no such file, damaged, or not weights of a model of motionlab.
+    """
+    tensors, header = _load(path)
+    try:
+        model = _KINDS[header["kind"]].from_config(header["config"])
+        model.load_state_dict(tensors)
+    except (KeyError, TypeError, RuntimeError, MotionLabError) as error:
+        raise TrainingError(
+            f"{path}: holds no weights of a model of motionlab ({error})."
+        ) from error
+    return model, header["about"]
+
+
+def save_checkpoint(
+    path: str | os.PathLike, model: nn.Module, optimizer: torch.optim.Optimizer, facts: dict
+) -> None:
+    """All that a training needs to go on: weights, the optimiser's memory, and `facts`."""
+    tensors = {f"model.{name}": tensor for name, tensor in model.state_dict().items()}
+    for index, memory in optimizer.state_dict()["state"].items():
+        tensors |= {f"optimizer.{index}.{name}": tensor for name, tensor in memory.items()}
+    _save(path, tensors, facts)
+
+
+def read_checkpoint(path: str | os.PathLike) -> tuple[dict[str, Tensor], dict]:
+    """Tensors and facts of `save_checkpoint`; raises TrainingError if the file is damaged."""
+    return _load(path)
+
+
+def restore(tensors: dict[str, Tensor], model: nn.Module, optimizer: torch.optim.Optimizer) -> None:
+    """Put what `read_checkpoint` gave back into model and optimiser."""
+    weights = {
+        name.removeprefix("model."): tensor
+        for name, tensor in tensors.items()
+        if name.startswith("model.")
+    }
+    memory: dict[int, dict[str, Tensor]] = {}
+    for key in tensors:
+        if key.startswith("optimizer."):
+            _, index, name = key.split(".", 2)
+            memory.setdefault(int(index), {})[name] = tensors[key]
+    model.load_state_dict(weights)
+    optimizer.load_state_dict({**optimizer.state_dict(), "state": memory})
+
+
+def _save(path: str | os.PathLike, tensors: dict[str, Tensor], header: dict) -> None:
+    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    content = safetensors.torch.save(tensors, {"motionlab": json.dumps(header)})
+    try:
+        write_whole(path, lambda stream: stream.write(content))
+    except OSError as error:
+        raise TrainingError(
+            f"{path}: can't be written ({error.strerror}); make room, or name another folder."
+        ) from error
+
+
+def _load(path: str | os.PathLike) -> tuple[dict[str, Tensor], dict]:
+    try:
+        with safetensors.safe_open(path, framework="pt") as file:
+            header = json.loads((file.metadata() or {})["motionlab"])
+            return {name: file.get_tensor(name) for name in file.keys()}, header  # noqa: SIM118
+    except FileNotFoundError as error:
+        raise TrainingError(f"{path}: there is no such file.") from error
+    except (OSError, KeyError, ValueError, safetensors.SafetensorError) as error:
+        raise TrainingError(
+            f"{path}: is damaged, or not a file of motionlab's ({error}); remove it or name another."
+        ) from error

@@ -1,0 +1,232 @@
+"""The loop that trains every supervised model: draw windows, step downhill, validate, keep.
+
+Chance is a function of the seed and the number of the update alone. A training that was killed and
+started again therefore draws the windows and the noise that it would have drawn anyway, and so do
+several processes, each of which takes its share of the same batch.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import sys
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import torch
+from lightning_fabric import Fabric
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from ..errors import TrainingError
+from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
+from .prepared import Prepared
+from .presets import Preset
+from .windows import Windows
+
+OPTIMIZERS = {
+    "adam": torch.optim.Adam,
+    "rmsprop": torch.optim.RMSprop,
+    "sgd": lambda parameters, lr: torch.optim.SGD(parameters, lr, momentum=0.9),
+}
+CHECKPOINT, BEST = "checkpoint.safetensors", "best.safetensors"
+# May change when a training goes on, as long as the updates already made would have been the same.
+_MAY_CHANGE = ("updates", "decay")
+
+
+def train(
+    model: nn.Module,
+    data: Prepared,
+    preset: Preset,
+    folder: str | os.PathLike,
+    *,
+    name: str,
+    accelerator: str = "auto",
+    devices: int = 1,
+    nodes: int = 1,
+    precision: str | None = None,
+    progress: bool = False,
+) -> list[dict]:
+    """Train a model, or go on where an earlier call with the same arguments was stopped.
+
+    Parameters
+    ----------
+    model : has ``loss(windows, noise)``, the mean over (batch, frames, dim) windows.
+    folder : receives ``checkpoint.safetensors`` (to go on from), ``best.safetensors`` (weights with
+        the lowest validation loss) and ``curve.json`` at every validation.
+    name : of the model, kept with its weights.
+    accelerator, devices, nodes, precision : as for Lightning Fabric; by default one device, the
+        best there is, in bfloat16 on a GPU and in float32 elsewhere.
+    progress : show a bar and a line for every validation.
+
+    Returns
+    -------
+    list of dict : the curve. For every validation: `update`, mean training loss `train` and
+        gradient norm `norm` since the last one, validation loss `val`, `seconds` of training.
+
+    Raises
+    ------
+    TrainingError : the folder holds another training; the loss is no longer a number; no clip is as
+        long as a window; a file can't be written.
+    """
+    gpu = accelerator in ("cuda", "gpu") or (accelerator == "auto" and torch.cuda.is_available())
+    precision = precision or ("bf16-mixed" if gpu else "32-true")
+    fabric = Fabric(accelerator=accelerator, devices=devices, num_nodes=nodes, precision=precision)
+    fabric.launch()
+    if preset.batch % fabric.world_size:
+        raise TrainingError(
+            f"A batch of {preset.batch} windows can't be shared by {fabric.world_size} processes."
+        )
+    training = Windows(data.clips("train"), preset.frames)
+    validation = Windows(data.clips("val"), preset.frames).tiles(4 * preset.batch)
+    optimizer = OPTIMIZERS[preset.optimizer](model.parameters(), lr=preset.learning_rate)
+    network, stepper = fabric.setup(model, optimizer)
+    network.mark_forward_method("loss")
+    facts = {
+        "name": name, "model": model.config(), "preset": asdict(preset), "data": data.hash,
+        "precision": precision, "update": 0, "seconds": 0.0, "curve": [],
+    }  # fmt: skip
+    _resume(fabric, Path(folder), model, optimizer, facts)
+
+    losses, norms, since = [], [], time.perf_counter()
+    shown = progress and fabric.is_global_zero
+    bar = tqdm(total=preset.updates, initial=facts["update"], desc=name, mininterval=1,
+               disable=None if shown else True)  # fmt: skip
+    with bar:
+        for update in range(facts["update"], preset.updates):
+            for group in optimizer.param_groups:
+                group["lr"] = preset.rate(update)
+            windows, noise = _share(fabric, *draw(training, preset, update))
+            loss = network.loss(windows, noise)
+            fabric.backward(loss)
+            norm = fabric.clip_gradients(
+                network, stepper, max_norm=preset.clip, error_if_nonfinite=False
+            )
+            if not norm.isfinite():
+                raise TrainingError(_not_a_number(update, loss, preset, facts, Path(folder)))
+            stepper.step()
+            stepper.zero_grad()
+            losses.append(fabric.all_reduce(loss.detach()).item())
+            norms.append(norm.item())
+            bar.update()
+
+            facts["update"] = update + 1
+            if facts["update"] % preset.validate_every and facts["update"] != preset.updates:
+                continue
+            facts["seconds"] += time.perf_counter() - since
+            facts["curve"].append({
+                "update": facts["update"], "train": statistics.fmean(losses),
+                "norm": statistics.fmean(norms), "val": evaluate(fabric, network, validation),
+                "seconds": facts["seconds"],
+            })  # fmt: skip
+            losses, norms, since = [], [], time.perf_counter()
+            if fabric.is_global_zero:
+                _keep(Path(folder), model, optimizer, facts)
+            if shown:
+                bar.write(_line(facts["curve"]))
+                sys.stdout.flush()  # for those who read along in a file
+    return facts["curve"]
+
+
+def draw(windows: Windows, preset: Preset, update: int) -> tuple[Tensor, Tensor]:
+    """Windows and noise (batch, frames, dim) of an update; nothing else decides on them."""
+    generator = torch.Generator().manual_seed(preset.seed * 1_000_003 + update)
+    batch = windows.draw(preset.batch, generator)
+    return batch, preset.noise * torch.randn(batch.shape, generator=generator)
+
+
+@torch.no_grad()
+def evaluate(fabric: Fabric, network: nn.Module, batches: list[Tensor]) -> float:
+    """Mean loss over windows, without noise; the processes share the batches."""
+    network.eval()
+    total = torch.zeros(2)
+    for batch in batches[fabric.global_rank :: fabric.world_size]:
+        loss = network.loss(batch.to(fabric.device)).item()
+        total += torch.tensor([loss * len(batch), len(batch)])
+    network.train()
+    loss, count = fabric.all_reduce(total.to(fabric.device), reduce_op="sum").tolist()
+    return loss / count
+
+
+def _share(fabric: Fabric, *tensors: Tensor) -> list[Tensor]:
+    """This process's part of a batch, on its device."""
+    return [t[fabric.global_rank :: fabric.world_size].to(fabric.device) for t in tensors]
+
+
+def _resume(
+    fabric: Fabric, folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, facts: dict
+) -> None:
+    """Go on from the folder's checkpoint if there is one; otherwise make the first."""
+    path = folder / CHECKPOINT
+    if path.exists():
+        tensors, found = read_checkpoint(path)
+        _check_same(path, found, facts)
+        restore(tensors, model, optimizer)
+        facts |= {key: found[key] for key in ("update", "seconds", "curve")}
+    fabric.barrier()  # nobody writes before all have looked
+    if fabric.is_global_zero and not facts["curve"]:
+        save_checkpoint(path, model, optimizer, facts)  # if it can't be written, fail now
+
+
+def _keep(folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, facts: dict) -> None:
+    """Write what the last validation brought. Killed in between, it is done once more."""
+    curve = facts["curve"]
+    if _is_best(curve):
+        save_weights(folder / BEST, model, facts)
+    save_checkpoint(folder / CHECKPOINT, model, optimizer, facts)
+    path = folder / "curve.json"
+    try:
+        write_whole(path, lambda stream: stream.write(json.dumps(curve, indent=1).encode()))
+    except OSError as error:
+        raise TrainingError(f"{path}: can't be written ({error.strerror}).") from error
+
+
+def _check_same(path: Path, found: dict, wanted: dict) -> None:
+    """Raise TrainingError if a checkpoint belongs to another training than the one wanted."""
+    try:
+        before, after = Preset(**found["preset"]), Preset(**wanted["preset"])
+        update = found["update"]
+        was, now = (
+            {key: facts[key] for key in ("name", "model", "data", "precision")}
+            | asdict(replace(preset, **dict.fromkeys(_MAY_CHANGE, 1)))
+            for facts, preset in ((found, before), (wanted, after))
+        )
+    except (KeyError, TypeError) as error:
+        raise TrainingError(f"{path}: is no checkpoint of this version ({error}).") from error
+    other = [key for key in now if was[key] != now[key]]
+    if other:
+        raise TrainingError(
+            f"{path}: belongs to a training with other {', '.join(other)}; repeat its settings to go "
+            "on with it, or name another folder."
+        )
+    if update > after.updates or any(before.rate(i) != after.rate(i) for i in range(update)):
+        raise TrainingError(
+            f"{path}: has made {update} updates with another learning rate than {after.updates} "
+            f"updates in all ask for. A training can be given another end only before its learning "
+            f"rate falls, the last {after.decay} updates; start a new one from its weights instead."
+        )
+
+
+def _not_a_number(update: int, loss: Tensor, preset: Preset, facts: dict, folder: Path) -> str:
+    curve = facts["curve"]
+    last = f"the mean loss before was {curve[-1]['train']:.2f}; " if curve else ""
+    kept = curve[-1]["update"] if curve else 0
+    return (
+        f"Update {update}: the loss is {loss.item():g} and its gradient is not a number; {last}the "
+        f"learning rate was {preset.rate(update):g}. {folder / CHECKPOINT} holds update {kept}. "
+        "Train with a lower learning rate in a new folder, and look for outliers in the data."
+    )
+
+
+def _is_best(curve: list[dict]) -> bool:
+    return all(curve[-1]["val"] < point["val"] for point in curve[:-1])
+
+
+def _line(curve: list[dict]) -> str:
+    point = curve[-1]
+    return (
+        f"update {point['update']:6}  {point['seconds'] / 60:7.1f} min  train {point['train']:9.3f}  "
+        f"val {point['val']:9.3f}{' *' if _is_best(curve) else '  '}  gradient {point['norm']:.2f}"
+    )

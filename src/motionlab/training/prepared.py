@@ -1,0 +1,191 @@
+"""Motion made ready for training, in one file that can travel to another machine by itself.
+
+The file is an ``.npz`` with, for all clips one after the other: `features` (rows, dim) in float32,
+`lengths` in frames, `names`, `splits`; with `mean`, `std`, `kept` of the normaliser fitted on the
+training split; with the `encoding`'s settings in JSON; and with the `hash` of all of these.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .. import datasets, encodings
+from ..encodings import JointAngles, Normalizer
+from ..errors import DataError
+from ..motion import Motion
+from ..skeleton import Skeleton
+from .checkpoints import write_whole
+
+FPS = 30.0
+_ARRAYS = ("features", "lengths", "names", "splits", "mean", "std", "kept", "encoding")
+SPLITS = ("train", "val", "test")
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Encoded clips with their splits, the normaliser of the training split, and a hash.
+
+    features : (rows, dim), all clips one after the other; lengths : (clips,) frames of each.
+    """
+
+    features: Tensor
+    lengths: Tensor
+    names: tuple[str, ...]
+    splits: tuple[str, ...]
+    encoding: encodings.Encoding
+    normalizer: Normalizer
+    hash: str
+
+    def clips(self, split: str) -> list[Tensor]:
+        """Features (frames, dim) of each clip of a split."""
+        each = zip(self.features.split(self.lengths.tolist()), self.splits, strict=True)
+        return [clip for clip, its in each if its == split]
+
+    def without_contacts(self) -> Prepared:
+        """The same clips as an encoding without contact channels, which come last, has them."""
+        encoding = encodings.from_config({**self.encoding.config(), "contacts": False})
+        full, normalizer = self.normalizer, Normalizer(
+            encoding.dim, int((self.normalizer.kept < encoding.dim).sum())
+        )  # fmt: skip
+        normalizer.mean.copy_(full.mean[: encoding.dim])
+        normalizer.std.copy_(full.std[: encoding.dim])
+        normalizer.kept.copy_(full.kept[full.kept < encoding.dim])
+        features = self.features[:, : encoding.dim].contiguous()
+        return replace(self, features=features, encoding=encoding, normalizer=normalizer)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the file; it appears whole or not at all. Raises DataError if it can't be."""
+        arrays = _arrays(self.features, self.lengths, self.names, self.splits, self.normalizer,
+                         self.encoding)  # fmt: skip
+        try:
+            write_whole(path, lambda stream: np.savez(stream, hash=np.array(self.hash), **arrays))
+        except OSError as error:
+            raise DataError(f"{path}: can't be written ({error.strerror}).") from error
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Prepared:
+        """Read what `save` wrote; raises DataError if it is missing, damaged or something else."""
+        try:
+            with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in _ARRAYS}
+                stored = str(file["hash"])
+            if stored != _digest(arrays):
+                raise ValueError("its hash does not fit")
+            normalizer = Normalizer(len(arrays["mean"]), len(arrays["kept"]))
+            normalizer.load_state_dict(
+                {k: torch.from_numpy(arrays[k]) for k in ("mean", "std", "kept")}
+            )
+            return cls(
+                torch.from_numpy(arrays["features"]), torch.from_numpy(arrays["lengths"]),
+                tuple(arrays["names"].tolist()), tuple(arrays["splits"].tolist()),
+                encodings.from_config(json.loads(str(arrays["encoding"]))), normalizer, stored,
+            )  # fmt: skip
+        except FileNotFoundError as error:
+            raise DataError(
+                f"{path}: there is no such file; `motionlab prepare` makes it."
+            ) from error
+        except (OSError, EOFError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile) as error:
+            raise DataError(
+                f"{path}: is not a whole file of prepared motion ({error}); make it anew with "
+                "`motionlab prepare`."
+            ) from error
+
+    @classmethod
+    def find(cls, source: str | os.PathLike) -> Prepared:
+        """A prepared file; or a data set or folder, made ready now if it was not before.
+
+        What is made is kept in `file_of(source)`. Folders, whose clips may change, are always read.
+        """
+        if Path(source).suffix == ".npz":
+            return cls.load(source)
+        kept = file_of(source)
+        if str(source) in datasets.names() and kept.exists():
+            return cls.load(kept)
+        made = prepare(source, progress=True)
+        made.save(kept)
+        return made
+
+
+def file_of(source: str | os.PathLike) -> Path:
+    """Where the command line keeps what it prepared of a data set or a folder."""
+    return Path("runs") / f"{Path(source).resolve().name}.npz"
+
+
+def prepare(source: str | os.PathLike, progress: bool = False) -> Prepared:
+    """Load, bring to the canonical skeleton at 30 frames per second, encode.
+
+    Parameters
+    ----------
+    source : the name of a data set, or a folder of BVH files.
+    progress : show how far it is.
+
+    Training clips are used twice, the second time mirrored. Rows are those of `JointAngles` with
+    contacts; see `Prepared.without_contacts`.
+
+    Raises
+    ------
+    DataError : no such data set or folder, files missing, or a split without clips.
+    """
+    from tqdm import tqdm
+
+    encoding = JointAngles(Skeleton.canonical(), fps=FPS, contacts=True)
+    features, names, splits = [], [], []
+    for split in SPLITS:
+        motions = _load(source, split)
+        bar = tqdm(motions, f"encoding {split}", leave=False, unit="clip", disable=not progress)
+        for motion in bar:
+            features.append(encoding.encode(motion))
+            names.append(f"{motion.source}/{motion.name}")
+            splits.append(split)
+    training = [clip for clip, split in zip(features, splits, strict=True) if split == "train"]
+    if not training or "val" not in splits:
+        raise DataError(
+            f"{source}: has {len(training)} clips for training and {splits.count('val')} for "
+            "validation; there must be some of both."
+        )
+    rows, lengths = torch.cat(features), torch.tensor([len(clip) for clip in features])
+    normalizer = Normalizer.fit(training)
+    digest = _digest(_arrays(rows, lengths, names, splits, normalizer, encoding))
+    return Prepared(rows, lengths, tuple(names), tuple(splits), encoding, normalizer, digest)
+
+
+def _load(source: str | os.PathLike, split: str) -> list[Motion]:
+    """Canonical clips of a split, in training with their mirror images."""
+    known = str(source) in datasets.names()
+    load = datasets.load if known else datasets.from_folder
+    motions = [motion.resample(FPS).retarget() for motion in load(source, split=split)]
+    if split == "train":
+        motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
+    return motions
+
+
+def _arrays(
+    features: Tensor, lengths: Tensor, names: Sequence[str], splits: Sequence[str],
+    normalizer: Normalizer, encoding: encodings.Encoding,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    return {
+        "features": features.numpy(),
+        "lengths": lengths.numpy(),
+        "names": np.array(names),
+        "splits": np.array(splits),
+        **{name: tensor.numpy() for name, tensor in normalizer.state_dict().items()},
+        "encoding": np.array(json.dumps(encoding.config())),
+    }
+
+
+def _digest(arrays: dict[str, np.ndarray]) -> str:
+    digest = hashlib.sha256()
+    for name in _ARRAYS:
+        digest.update(name.encode() + str(arrays[name].shape).encode())
+        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()

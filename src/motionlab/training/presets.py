@@ -1,0 +1,105 @@
+"""How a model is trained: every number that is not in the model or in the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import torch
+
+from ..errors import TrainingError
+from ..models import LstmGmm
+from .checkpoints import load_weights
+from .prepared import Prepared
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Settings of a training by gradient descent.
+
+    The learning rate rises over `warmup` updates, stays, and falls to zero over the last `decay`
+    updates. What happens before the fall does not depend on the total: a training can be prolonged,
+    or brought to its end, by starting it again with other `updates`.
+    """
+
+    updates: int
+    """Total number of updates of the weights."""
+    decay: int
+    """Updates at the end in which the learning rate falls to zero."""
+    batch: int
+    """Windows in an update."""
+    frames: int
+    """Frames in a window."""
+    validate_every: int
+    """Updates from one validation, and checkpoint, to the next."""
+    width: int = 512
+    """Width of the hidden layers."""
+    components: int = 5
+    """Gaussians in the mixture."""
+    noise: float = 0.05
+    """Standard deviation of the noise on the input frames, in normalised units."""
+    optimizer: Literal["adam", "rmsprop", "sgd"] = "adam"
+    """Rule by which gradients become steps."""
+    learning_rate: float = 1e-3
+    """Largest learning rate."""
+    warmup: int = 200
+    """Updates in which the learning rate rises from zero."""
+    shrink: float = 1.0
+    """Factor on the learning rate each update, for schedules that fall from the beginning."""
+    clip: float = 5.0
+    """Largest norm of the gradient; what is longer is shortened to it."""
+    seed: int = 0
+    """Start of all chance: first weights, windows, noise."""
+
+    def __post_init__(self) -> None:
+        counts = ("updates", "batch", "frames", "validate_every", "width", "components")
+        if any(getattr(self, name) < 1 for name in counts) or self.frames < 2:
+            raise TrainingError(f"{', '.join(counts)} must be 1 or more, frames 2 or more: {self}.")
+        if min(self.warmup, self.decay, self.noise) < 0 or min(self.learning_rate, self.clip) <= 0:
+            raise TrainingError(
+                f"warmup, decay, noise must not be negative, learning_rate and clip be positive: "
+                f"{self}."
+            )
+
+    def rate(self, update: int) -> float:
+        """Learning rate of an update, counted from 0."""
+        rise = (update + 1) / (self.warmup + 1)
+        fall = (self.updates - update) / (self.decay + 1)
+        return self.learning_rate * min(1.0, rise, fall) * self.shrink**update
+
+
+# smoke: seconds, for tests. table: the equal budget of all rows of a comparison. ship: what is
+# shipped. paper: as the paper has it (300 epochs of about 200 updates; its widths are not known).
+_LSTM_GMM = {
+    "smoke": Preset(
+        updates=40, decay=10, batch=8, frames=16, validate_every=10, width=32, warmup=5
+    ),
+    "table": Preset(updates=8_000, decay=1_500, batch=32, frames=64, validate_every=200, width=256),
+    "ship": Preset(updates=60_000, decay=3_000, batch=32, frames=64, validate_every=200),
+    "paper": Preset(
+        updates=60_000, decay=0, batch=20, frames=50, validate_every=1_000, optimizer="rmsprop",
+        warmup=0, shrink=0.95 ** (1 / 200),
+    ),
+}  # fmt: skip
+
+PRESETS = {"lstm-gmm": _LSTM_GMM, "lstm-gmm-contacts": _LSTM_GMM}
+
+
+def build(data: Prepared, preset: Preset, start: Path | None = None) -> LstmGmm:
+    """The model to train: with weights drawn from the preset's seed, or those of a file.
+
+    Raises
+    ------
+    TrainingError : the weights are for another encoding than the data's.
+    """
+    if start is None:
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(preset.seed)
+            return LstmGmm(data.encoding, data.normalizer, preset.width, preset.components)
+    model, _ = load_weights(start)
+    if model.encoding.config() != data.encoding.config():
+        raise TrainingError(
+            f"{start}: these weights are for features of another kind than the data."
+        )
+    return model

@@ -1,0 +1,53 @@
+"""Windows of equal length, cut from clips of any length."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from ..errors import TrainingError
+
+
+class Windows:
+    """All windows of some frames in a list of clips; clips shorter than that have none.
+
+    Parameters
+    ----------
+    clips : list of (frames, dim).
+    frames : length of a window.
+
+    Raises
+    ------
+    TrainingError : no clip is long enough.
+    """
+
+    def __init__(self, clips: Sequence[Tensor], frames: int) -> None:
+        lengths = [len(clip) for clip in clips]
+        if max(lengths, default=0) < frames:
+            raise TrainingError(
+                f"All {len(lengths)} clips are shorter than a window of {frames} frames (the longest "
+                f"has {max(lengths, default=0)}); train on longer clips, or with fewer frames."
+            )
+        self.rows = torch.cat(list(clips))  # (all rows, dim)
+        ends = torch.tensor(lengths).cumsum(0).tolist()
+        spans = [range(end - n, end - frames + 1) for end, n in zip(ends, lengths, strict=True)]
+        self._starts = torch.tensor([start for span in spans for start in span])
+        # one after the other, the last one moved back so that it ends with the clip
+        tiles = [start for span in spans if span for start in {*span[::frames], span[-1]}]
+        self._tiles = torch.tensor(sorted(tiles))
+        self._within = torch.arange(frames)
+
+    def draw(self, count: int, generator: torch.Generator) -> Tensor:
+        """Windows (count, frames, dim), each as likely as any other."""
+        return self._cut(
+            self._starts[torch.randint(len(self._starts), (count,), generator=generator)]
+        )
+
+    def tiles(self, batch: int) -> list[Tensor]:
+        """Windows (at most batch, frames, dim) that together cover every clip."""
+        return [self._cut(starts) for starts in self._tiles.split(batch)]
+
+    def _cut(self, starts: Tensor) -> Tensor:
+        return self.rows[starts[:, None] + self._within]

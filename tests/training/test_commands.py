@@ -1,0 +1,60 @@
+"""`motionlab prepare` and `motionlab train`."""
+
+import json
+
+import pytest
+
+from motionlab.__main__ import main
+from motionlab.training import checkpoints
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+SMOKE = ["--preset", "smoke", "--data", "gaits", "--accelerator", "cpu", "--updates", "12"]
+
+
+def test_train_prepares_trains_and_goes_on(here, capsys):
+    assert main(["train", "lstm-gmm", *SMOKE]) == 0
+    assert "12 updates; best of validation" in capsys.readouterr().out
+    folder = here / "runs" / "lstm-gmm-smoke"
+    assert (here / "runs" / "gaits.npz").exists()
+    curve = json.loads((folder / "curve.json").read_text())
+    assert [point["update"] for point in curve] == [10, 12]
+    model, about = checkpoints.load_weights(folder / "best.safetensors")
+    assert about["name"] == "lstm-gmm" and "contacts" not in model.encoding.slices
+    assert main(["train", "lstm-gmm", *SMOKE]) == 0
+    assert json.loads((folder / "curve.json").read_text()) == curve
+    # another preset in the same folder, and weights of another kind
+    assert main(["train", "lstm-gmm", *SMOKE, "--seed", "3"]) == 1
+    assert "other seed" in capsys.readouterr().err
+    start = ["--from", str(folder / "best.safetensors")]
+    assert main(["train", "lstm-gmm-contacts", *SMOKE, *start]) == 1
+    assert "features of another kind" in capsys.readouterr().err
+    assert main(["train", "lstm-gmm", *SMOKE, *start, "--out", "tuned"]) == 0
+    assert (here / "tuned" / "best.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["prepare", "amass"], "is not a folder"),
+        (["train", "lstm-gmm", "--data", "none.npz"], "no such file"),
+        (["train", "lstm-gmm", *SMOKE, "--learning-rate", "-1"], "learning_rate"),
+        (["train", "lstm-gmm", *SMOKE, "--from", "none.safetensors"], "no such file"),
+    ],
+)
+def test_bad_arguments_are_answered(here, capsys, arguments, said):
+    assert main(arguments) == 1
+    printed = capsys.readouterr().err
+    assert said in printed and "Traceback" not in printed
+
+
+def test_prepare_into_what_cannot_be_written(here, capsys):
+    (here / "file").write_text("in the way")
+    assert main(["prepare", "gaits", "--out", "file/gaits.npz"]) == 1
+    assert "can't be written" in capsys.readouterr().err

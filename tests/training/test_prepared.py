@@ -1,0 +1,111 @@
+"""Prepared data: what is in them, and that files are whole or refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from motionlab import Skeleton, datasets, write_bvh
+from motionlab.__main__ import main
+from motionlab.encodings import JointAngles, Normalizer
+from motionlab.errors import DataError
+from motionlab.training import Prepared, prepare
+
+
+def test_rows_are_the_encoded_clips(gaits):
+    encoding = JointAngles(Skeleton.canonical(), contacts=True)
+    for split in ("val", "test"):
+        motions = datasets.load("gaits", split)
+        for motion, clip in zip(motions, gaits.clips(split), strict=True):
+            assert torch.equal(encoding.encode(motion), clip)
+    training = datasets.load("gaits", "train", mirrored=True)
+    assert [f"{m.source}/{m.name}" for m in training] == list(gaits.names[: len(training)])
+    for motion, clip in zip(training, gaits.clips("train"), strict=True):
+        assert torch.equal(encoding.encode(motion), clip)
+    its = Normalizer.fit(gaits.clips("train")).state_dict()
+    assert all(torch.equal(v, its[k]) for k, v in gaits.normalizer.state_dict().items())
+
+
+def test_no_mirrored_copy_leaves_its_split(gaits):
+    where = {}
+    for name, split in zip(gaits.names, gaits.splits, strict=True):
+        assert where.setdefault(name.removesuffix("_mirrored"), split) == split
+    assert {s for n, s in zip(gaits.names, gaits.splits, strict=True) if "mirrored" in n} == {
+        "train"
+    }
+
+
+def test_saved_and_loaded(gaits, tmp_path):
+    gaits.save(tmp_path / "new" / "gaits.npz")
+    back = Prepared.load(tmp_path / "new" / "gaits.npz")
+    assert torch.equal(back.features, gaits.features) and torch.equal(back.lengths, gaits.lengths)
+    assert (back.names, back.splits, back.hash) == (gaits.names, gaits.splits, gaits.hash)
+    assert back.encoding.config() == gaits.encoding.config()
+    its = back.normalizer.state_dict()
+    assert all(torch.equal(v, its[k]) for k, v in gaits.normalizer.state_dict().items())
+
+
+def test_without_contacts_is_the_encoding_without(gaits):
+    plain = gaits.without_contacts()
+    motion = datasets.load("gaits", "val")[0]
+    assert torch.equal(plain.encoding.encode(motion), plain.clips("val")[0])
+    its = Normalizer.fit(plain.clips("train")).state_dict()
+    for name, value in plain.normalizer.state_dict().items():
+        torch.testing.assert_close(value, its[name])
+
+
+def test_the_hash_tells_data_apart(gaits, tmp_path):
+    gaits.save(tmp_path / "gaits.npz")
+    with np.load(tmp_path / "gaits.npz") as file:
+        arrays = dict(file)
+    arrays["features"][1000, 5] += 1e-3
+    np.savez(tmp_path / "other.npz", **arrays)
+    with pytest.raises(DataError, match="hash does not fit"):
+        Prepared.load(tmp_path / "other.npz")
+
+
+def test_files_that_are_not_prepared_data(gaits, tmp_path):
+    with pytest.raises(DataError, match="no such file.*motionlab prepare"):
+        Prepared.load(tmp_path / "none.npz")
+    gaits.save(tmp_path / "half.npz")
+    half = (tmp_path / "half.npz").read_bytes()
+    for content in (b"", b"no archive", half[: len(half) // 2]):
+        (tmp_path / "half.npz").write_bytes(content)
+        with pytest.raises(DataError, match="not a whole file"):
+            Prepared.load(tmp_path / "half.npz")
+    np.savez(tmp_path / "else.npz", a=np.zeros(3))
+    with pytest.raises(DataError, match="not a whole file"):
+        Prepared.load(tmp_path / "else.npz")
+
+
+def test_a_save_that_fails_leaves_the_old_file(gaits, tmp_path, monkeypatch):
+    path = tmp_path / "gaits.npz"
+    gaits.save(path)
+    old = path.read_bytes()
+
+    def full(stream, **arrays):
+        stream.write(b"some of it")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+    with pytest.raises(DataError, match="No space left"):
+        replace(gaits, hash="new").save(path)
+    assert path.read_bytes() == old and list(tmp_path.iterdir()) == [path]
+
+
+def test_unknown_names(tmp_path):
+    with pytest.raises(DataError, match="is not a folder"):
+        prepare(tmp_path / "nothing")
+
+
+def test_a_folder_of_bvh_files(tmp_path, monkeypatch):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for i, motion in enumerate(datasets.load("gaits", "val") + datasets.load("gaits", "test")):
+        write_bvh(motion[:40], folder / f"{i}.bvh")
+    monkeypatch.chdir(tmp_path)
+    assert main(["prepare", "mine"]) == 0
+    mine = Prepared.load("runs/mine.npz")
+    assert mine.splits.count("train") == 2 * 6 and mine.splits.count("val") == 1
+    assert mine.lengths.tolist() == [40] * len(mine.names)
