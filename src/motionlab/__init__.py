@@ -13,8 +13,12 @@ __all__ = [
     "MotionLabError",
     "Skeleton",
     "concatenate",
+    "contacts",
     "datasets",
+    "encodings",
     "forward_kinematics",
+    "ik",
+    "metrics",
     "read_bvh",
     "show",
     "viewer",
@@ -27,8 +31,8 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str):
-    # Data sets and pictures are imported when first used: reading a clip needs neither.
-    if name in ("datasets", "viewer"):
+    # Imported when first used: reading a clip needs none of them.
+    if name in ("contacts", "datasets", "encodings", "ik", "metrics", "viewer"):
         import importlib
 
         return importlib.import_module(f".{name}", __name__)
