@@ -61,7 +61,11 @@ def main(options: Options) -> None:
             ("nearest_window_distance", f"{times['motionlab'] / SAMPLE / 25:.4f} s", "a window"),
             ("  ratio", "", verdict(ratio, 0.1)),
             ("nearest_window_distance, all", f"{seconds:.1f} s", verdict(seconds / 60, 1)),
-            ("  memory beside the features", f"{memory / 2**20:.0f} MB", ""),
+            (
+                "  memory beside the features",
+                f"{memory / 2**20:.0f} MB",
+                verdict(memory / 2**30, 1),
+            ),
         ],
     )
     if options.save:

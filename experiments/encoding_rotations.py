@@ -27,7 +27,9 @@ import roma
 import torch
 from torch import Tensor
 
+import motionlab
 from motionlab import Motion, Skeleton, datasets
+from motionlab.datasets import registry, splits
 from motionlab.encodings import JointAngles, Normalizer
 
 TARGET = Path(__file__).parents[1] / "results" / "encoding_rotations.json"
@@ -73,7 +75,11 @@ def main() -> None:
         rows[name]["same_inputs_error_cm"] = step_error(decode, everything, normal[name])
     for name, row in rows.items():
         print(f"{name:<18}", *(f"{key} {value:.4g}" for key, value in row.items()), sep="  ")
+    clips = registry.members("locomotion")
     record = {
+        "command": "python experiments/encoding_rotations.py",
+        "code_version": motionlab.__version__,
+        "data_hash": splits.digest((c.source, c.path, c.split) for c in clips),
         "rule": __doc__.split("\n\n")[3].replace("\n", " ").strip(),
         "rule_gives": choose(rows),
         "encodings": rows,

@@ -1,24 +1,21 @@
 """Mean pose of the training data, for rotation vectors relative to it.
 
-    python experiments/fit_mean_pose.py [--gaits]
+    python experiments/fit_mean_pose.py
 
 Writes src/motionlab/encodings/mean_pose.json: one rotation vector a joint of the canonical skeleton,
 the mean of its local rotations over all frames of the training split of `locomotion` and their
 mirror images. The mean is the rotation nearest to all in least squares of their matrices (Moakher
-2002, the projected arithmetic mean), which needs no iteration. With --gaits the made gaits take the
-place of the real data.
+2002, the projected arithmetic mean), which needs no iteration.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import roma
 import torch
-import tyro
 
 from motionlab import Motion, Skeleton, datasets
 from motionlab.kinematics import heading, yaw_matrix
@@ -26,14 +23,8 @@ from motionlab.kinematics import heading, yaw_matrix
 TARGET = Path(__file__).parents[1] / "src" / "motionlab" / "encodings" / "mean_pose.json"
 
 
-@dataclass
-class Options:
-    gaits: bool = False
-
-
-def main(options: Options) -> None:
-    name = "gaits" if options.gaits else "locomotion"
-    motions = datasets.load(name, "train")
+def main() -> None:
+    motions = datasets.load("locomotion", "train")
     # the mean of a body is symmetric if left and right are
     motions += [motion.mirror() for motion in motions]
     rotations = torch.cat([upright(motion) for motion in motions])
@@ -41,7 +32,7 @@ def main(options: Options) -> None:
     vectors = roma.rotmat_to_rotvec(mean).mul(1e5).round().div(1e5) + 0.0
     spread = roma.rotmat_geodesic_distance(mean[None], rotations).max(0).values
     record = {
-        "source": f"{name}, training split, mirrored copies included",
+        "source": "locomotion, training split, mirrored copies included",
         "frames": len(rotations),
         "unit": "radians",
         "rotation_vectors": dict(zip(Skeleton.canonical().names, vectors.tolist(), strict=True)),
@@ -60,4 +51,4 @@ def upright(motion: Motion) -> torch.Tensor:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Options, description=__doc__))
+    main()

@@ -18,6 +18,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -175,6 +176,7 @@ def describe(motions: Iterable[Motion]) -> dict[str, float]:
 
 
 def main() -> None:
+    begin = time.perf_counter()
     torch.set_num_threads(1)  # clips are too small to share
     clips = registry.members("locomotion")
     motions = dict(zip(clips, datasets.load("locomotion"), strict=True))
@@ -205,7 +207,8 @@ def main() -> None:
         "command": "python experiments/locomotion_table.py",
         "code_version": motionlab.__version__,
         "data_hash": hashlib.sha256(facts.encode()).hexdigest(),
-        "python": platform.python_version(),
+        "machine": platform.platform(),
+        "seconds": round(time.perf_counter() - begin, 1),
         "all": describe(motions.values()),
         "sources": sources,
         "table": table,

@@ -5,9 +5,9 @@
 The training clips of a set are split in two halves by performance, so that both have all actions
 and styles. Metrics of one clip are given for each half, distances of sets for each half from the
 other: differences between the halves are what no model's number can be trusted below. Intervals
-are bootstrapped over clips, that of the Fréchet distance is a jackknife's. Validation clips tell how often the detectors, fitted on the training
-clips, raise an alarm on real motion; planted failures, how often and how late they find one. Test
-clips are not opened.
+are bootstrapped over clips, that of the Fréchet distance is a jackknife's. Validation clips tell
+how often the detectors, fitted on the training clips, raise an alarm on real motion; planted
+failures, how often and how late they find one. Test clips are not opened.
 """
 
 from __future__ import annotations
@@ -79,7 +79,8 @@ def _measured(name: str, actions: tuple[str, ...]) -> dict:
         [m.positions() for m in motions], fps=FPS, skeleton=motions[0].skeleton
     )
     held_out = _chosen(name, "val", actions)
-    return {
+    recorded = {"as recorded": _as_recorded(motions)} if name == "locomotion" else {}
+    return recorded | {
         "clips": {half: len(some) for half, some in halves.items()},
         "minutes": {half: sum(m.seconds for m in some) / 60 for half, some in halves.items()},
         "halves": clip_wise,
@@ -136,6 +137,23 @@ def _of_clips(motions: list[Motion]) -> dict[str, metrics.Interval]:
         metric: metrics.bootstrap(numbers, seed=SEED)
         for metric, numbers in values.items()
         if not np.isnan(numbers).all()
+    }
+
+
+def _as_recorded(motions: list[Motion]) -> dict[str, dict[str, metrics.Interval]]:
+    """The clips before retargeting planted their feet, and after, by source."""
+    rows = defaultdict(lambda: defaultdict(list))
+    for source in sorted({motion.source for motion in motions}):
+        after = {motion.name: motion for motion in motions if motion.source == source}
+        for motion in datasets.load(source, clips=list(after)):
+            for when, clip in (("recorded", motion.resample(FPS)), ("planted", after[motion.name])):
+                p, skeleton, down = clip.positions(), clip.skeleton, contacts.label(clip)
+                skate = metrics.foot_skate(p, down, skeleton, FPS)
+                rows[source][f"foot skate, {when} (cm/s)"].append(float(skate))
+                rows[source][f"jerk, {when} (m/s³)"].append(float(metrics.jerk(p, FPS)))
+    return {
+        source: {metric: metrics.bootstrap(values, seed=SEED) for metric, values in row.items()}
+        for source, row in rows.items()
     }
 
 

@@ -215,6 +215,8 @@ def test_agreement_pools_batches_and_knows_perfection():
         (dict(speed=-1), "speed is -1"),
         (dict(step=None), "step is None"),
         (dict(height=float("nan")), "height is nan"),
+        (dict(floor="ground"), "floor is 'ground'"),
+        (dict(floor=float("nan")), "floor is nan"),
         (dict(skeleton="canonical"), "skeleton is 'canonical'"),
         (dict(positions=torch.zeros(4, 3)), "(4, 3)"),
         (dict(positions=torch.zeros(0, 26, 3)), "at least one frame"),
@@ -235,7 +237,8 @@ def test_bad_labels_and_motions_are_answered():
     with pytest.raises(MotionError, match="takes a Motion, not Tensor"):
         contacts.label(still())
     truth = torch.zeros(5, 4, dtype=torch.bool)
-    for found, message in ((truth[:4], "same frames"), (truth.float(), "must be bool")):
+    wrong = ((truth[:4], "same frames"), (truth.float(), "must be bool"), ("x", "arrays of bool"))
+    for found, message in wrong:
         with pytest.raises(MotionError, match=message):
             contacts.agreement(found, truth)
 

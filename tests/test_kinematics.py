@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from motionlab.errors import MotionError
 from motionlab.kinematics import forward_kinematics, heading, yaw_matrix
 
 
@@ -110,6 +111,17 @@ def test_sampling_first_does_not_spoil_training():
     body["rotations"] = body["rotations"].clone().requires_grad_()
     forward_kinematics(**body)[0].sum().backward()
     assert body["rotations"].grad.abs().sum() > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [("offsets", (3, 3)), ("root_positions", (3, 3)), ("root_positions", (3,)),
+     ("rotations", (2, 5, 3, 3)), ("rotations", (2, 4, 9)), ("end_offsets", (1, 3))],
+    ids=["offsets", "roots", "one root", "joints", "flat", "ends"],
+)  # fmt: skip
+def test_shapes_that_do_not_fit(name, shape):
+    with pytest.raises(MotionError, match="4 joints and 2 end sites need"):
+        forward_kinematics(**random_body(6, (2,), 4) | {name: torch.zeros(shape)})
 
 
 # -- heading ---------------------------------------------------------------------------------------

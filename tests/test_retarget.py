@@ -161,6 +161,72 @@ def test_few_frames(gait, frames):
     assert len(found) == frames and found.contacts.shape == (frames, 4)
 
 
+@pytest.mark.parametrize(
+    "places",
+    [
+        ["LeftLowerLeg", "LeftFoot", "RightFoot"],
+        ["LeftLowerArm", "RightHand"],
+        ["LeftUpperLeg", "RightUpperLeg", "Neck"],
+        ["Hips"],
+    ],
+    ids=["leg twists", "arm twists", "hip joints and neck", "root above the hips"],
+)
+def test_a_target_may_have_joints_between(gait, places):
+    """Half way along a bone, meaning nothing: every other joint comes where it came without."""
+    motion = renamed(gait["walk_1.3"], 1.2)
+    longer = CANONICAL
+    for number, name in enumerate(places):
+        longer = with_joint(longer, name, f"twist{number}")
+    found, wanted = motion.retarget(longer), motion.retarget()
+    joints = [longer.index(name) for name in CANONICAL.names]
+    apart = found.positions()[:, joints] - wanted.positions()[:, : CANONICAL.joints]
+    assert apart.norm(dim=-1).max() < 1e-4
+    assert torch.equal(found.contacts, wanted.contacts)
+
+
+def with_joint(s: Skeleton, name: str, new: str) -> Skeleton:
+    """The skeleton with a joint half way from a joint's parent to the joint (or below the root)."""
+    at = s.index(name)
+    shift = lambda parents: [parent + (parent >= at) for parent in parents]
+    parents, offsets, names = shift(s.parents), list(s.offsets), list(s.names)
+    parents.insert(at, parents[at])
+    parents[at + 1] = at
+    offsets.insert(at, offsets[at] / 2)
+    offsets[at + 1] = offsets[at]
+    names.insert(at, new)
+    return Skeleton(names, parents, torch.stack(offsets), shift(s.end_parents), s.end_offsets)
+
+
+def test_what_a_source_lacks_follows_what_it_is_on(gait):
+    """The neck of a source that has none goes with the chest, across a joint without a role too."""
+    motion = without(gait["run_3.0"], "Neck", "Head")
+    longer = with_joint(CANONICAL, "Neck", "middle")
+    found = motion.retarget(longer)
+    chest, neck = (found.orientations()[:, longer.index(name)] for name in ("Chest", "Neck"))
+    torch.testing.assert_close(neck, chest)
+    assert (chest - found.orientations()[:, 0]).abs().max() > 0.01  # which are not the hips
+
+
+def test_gradients_stop(gait):
+    motion = replace(renamed(gait["walk_1.3"], 1.1), contacts=None)
+    found = retarget(replace(motion, rotations=motion.rotations.clone().requires_grad_()))
+    assert torch.equal(found.rotations, retarget(motion).rotations)
+    assert not found.rotations.requires_grad
+
+
+def test_mirrored_and_turned_sources_give_mirrored_and_turned_results(gait):
+    motion = replace(renamed(gait["run_2.6_turn_left_0.6"], 1.1), contacts=None)
+    found = retarget(motion)
+    assert_same(retarget(motion.mirror()), found.mirror(), 0.1, 0.05)
+    turn = roma.rotvec_to_rotmat(torch.tensor([0.0, 2.0, 0.0]))
+    moved = lambda m, metres=1.0: replace(
+        m,
+        root_positions=m.root_positions @ turn.mT + metres * torch.tensor([3.0, 0, -2]),
+        rotations=torch.cat([turn @ m.rotations[:, :1], m.rotations[:, 1:]], 1),
+    )
+    assert_same(retarget(moved(motion)), moved(found, 1 / 1.1), 0.5, 0.1)
+
+
 def without(motion: Motion, *names: str) -> Motion:
     """The motion with joints that mean nothing to anyone."""
     s = motion.skeleton
@@ -181,8 +247,43 @@ def test_what_is_missing_is_named(gait):
         turned = torch.eye(3).repeat(21, 1, 1)
         turned[1:] = roma.euler_to_rotmat("X", torch.tensor([2.0]))
         motion.retarget(renamed(motion, 1.0, turned).skeleton)
-    with pytest.raises(RetargetError, match="reference"):
-        retarget(renamed(motion, 1.2), reference=motion)
+    for reference in (motion, "standing"):
+        with pytest.raises(RetargetError, match="reference"):
+            retarget(renamed(motion, 1.2), reference=reference)
+    for wrong in (("walk", CANONICAL), (motion, "canonical")):
+        with pytest.raises(RetargetError, match="takes a Motion and a Skeleton"):
+            retarget(*wrong)
+
+
+@pytest.mark.parametrize("limb", ["left_hand", "right_foot", "right_lower_leg"])
+def test_limbs_without_length_are_named(gait, limb):
+    motion = renamed(gait["walk_1.3"])
+    offsets = motion.skeleton.offsets.clone()
+    offsets[motion.skeleton.index(limb)] = 0
+    flat = replace(motion.skeleton, offsets=offsets)
+    with pytest.raises(RetargetError, match=f"motion's skeleton has no bone .* to {limb}"):
+        retarget(replace(motion, skeleton=flat))
+    with pytest.raises(RetargetError, match=f"target skeleton has no bone .* to {limb}"):
+        gait["walk_1.3"].retarget(flat)
+
+
+def test_a_target_needs_toes_or_the_ends_of_feet(gait):
+    s = CANONICAL
+    bare = [i for i, name in enumerate(s.names) if "Toes" not in name]
+    target = Skeleton(
+        [s.names[i] for i in bare],
+        [bare.index(s.parents[i]) if i else -1 for i in bare],
+        1.1 * s.offsets[bare],
+    )
+    with pytest.raises(RetargetError, match="neither toes nor end sites"):
+        gait["walk_1.3"].retarget(target)
+    feet = [target.index(f"{side}_foot") for side in ("left", "right")]
+    ends = torch.tensor([[0.0, -0.08, 0.1]]).expand(2, 3)
+    target = replace(target, end_parents=feet, end_offsets=ends)
+    found = gait["walk_1.3"].retarget(target)
+    points = found.positions()
+    heights = points[:, feet, 1][found.contacts[:, [0, 2]]]
+    assert heights.std() < 1e-3 and points[..., 1].min() > 0.0
 
 
 def test_toes_neck_and_collars_may_be_missing(gait):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 import torch
 
@@ -144,7 +145,9 @@ def test_mirrored_twice_is_the_same():
         (dict(names=(), parents=(), offsets=[]), "at least one joint"),
         (dict(names=("a", "b", "a")), "'a'"),
         (dict(names=("a", "", "c")), "needs a name"),
-        (dict(names=("a", 3, "c")), "needs a name"),
+        (dict(names=("a", 3, "c")), "list of words"),
+        (dict(names=None), "`names` is None"),
+        (dict(names="abc"), "list of words"),
         (dict(names=("a", "b")), "one of each"),
         (dict(parents=(-1, 0)), "one of each"),
         (dict(parents=(-1, 2, 1)), "after its parent"),
@@ -164,6 +167,8 @@ def test_mirrored_twice_is_the_same():
         (dict(end_parents=(5,), end_offsets=torch.zeros(1, 3)), "not there"),
         (dict(end_parents=(-1,), end_offsets=torch.zeros(1, 3)), "not there"),
         (dict(end_parents=(0,), end_offsets=torch.full((1, 3), float("inf"))), "infinite"),
+        (dict(rotation_orders=None), "`rotation_orders`"),
+        (dict(rotation_orders=(1, 2, 3)), "`rotation_orders`"),
         (dict(rotation_orders=("XYZ",)), "one of each"),
         (dict(rotation_orders=("XYZ", "XYX", "ZYX")), "'XYX'"),
         (dict(rotation_orders=("XYZ", "xyz", "ZYX")), "'xyz'"),
@@ -174,6 +179,13 @@ def test_refused(change, words):
     Skeleton(**good)
     with pytest.raises(SkeletonError, match=words):
         Skeleton(**{**good, **change})
+
+
+def test_an_array_given_may_be_written_to_afterwards():
+    offsets = np.zeros((2, 3), dtype=np.float32)
+    skeleton = Skeleton(("a", "b"), (-1, 0), offsets, (1,), offsets[1:])
+    offsets[1] = 5
+    assert skeleton.offsets.abs().max() == skeleton.end_offsets.abs().max() == 0
 
 
 def test_frozen():

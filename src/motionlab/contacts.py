@@ -91,7 +91,7 @@ def label_positions(
         unknown rule.
     SkeletonError : the skeleton has no feet.
     """
-    positions = _check(positions, skeleton, fps, rule, speed, height, step)
+    positions = _check(positions, skeleton, fps, rule, speed, height, step, floor)
     feet = positions[..., foot_points(skeleton), :]
     found = foot_speeds(feet, fps, step) < speed
     if rule == "speed":
@@ -164,7 +164,10 @@ def agreement(found: Tensor, truth: Tensor) -> dict[str, dict[str, float]]:
     ------
     MotionError : not two bool arrays of one such shape.
     """
-    found, truth = torch.as_tensor(found), torch.as_tensor(truth)
+    try:
+        found, truth = torch.as_tensor(found), torch.as_tensor(truth)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise MotionError(f"found and truth must be arrays of bool: {error}.") from error
     if found.shape != truth.shape or found.ndim < 2 or found.shape[-1] != len(CHANNELS):
         raise MotionError(
             f"found has shape {tuple(found.shape)} and truth {tuple(truth.shape)}; both must be "
@@ -195,6 +198,14 @@ def agreement(found: Tensor, truth: Tensor) -> dict[str, dict[str, float]]:
     }
 
 
+def _number(value: object) -> float:
+    """The value as a number; NaN if it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
+
+
 def _check(
     positions: Tensor,
     skeleton: Skeleton,
@@ -203,6 +214,7 @@ def _check(
     speed: float,
     height: float,
     step: float,
+    floor: float | None,
 ) -> Tensor:
     if not isinstance(skeleton, Skeleton):
         raise MotionError(f"contacts: skeleton is {skeleton!r}, not a Skeleton.")
@@ -210,12 +222,10 @@ def _check(
         raise MotionError(f"There is no contact rule {rule!r}; use one of {', '.join(RULES)}.")
     given = {"fps": fps, "speed": speed, "height": height, "step": step}
     for name, value in given.items():
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            number = math.nan
-        if not (math.isfinite(number) and number > 0):
+        if not 0 < _number(value) < math.inf:
             raise MotionError(f"contacts: {name} is {value!r}; it must be a positive number.")
+    if floor is not None and not math.isfinite(_number(floor)):
+        raise MotionError(f"contacts: floor is {floor!r}; it must be a number of metres, or None.")
     try:
         positions = torch.as_tensor(positions)
     except (TypeError, ValueError, RuntimeError) as error:

@@ -14,6 +14,8 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+from .errors import MotionError
+
 
 def forward_kinematics(
     parents: Sequence[int],
@@ -37,8 +39,20 @@ def forward_kinematics(
     -------
     positions : (..., joints + end sites, 3), in the unit of the offsets, joints first.
     orientations : (..., joints, 3, 3), joint frame to world frame.
+
+    Raises
+    ------
+    MotionError : shapes that do not fit.
     """
     batch, joints = rotations.shape[:-3], len(parents)
+    ends = 0 if end_offsets is None else len(end_offsets)
+    found = (tuple(offsets.shape), tuple(root_positions.shape), tuple(rotations.shape), ends)
+    if found != ((joints, 3), (*batch, 3), (*batch, joints, 3, 3), len(end_parents)):
+        raise MotionError(
+            f"{joints} joints and {len(end_parents)} end sites need offsets ({joints}, 3), "
+            f"root_positions (..., 3), rotations (..., {joints}, 3, 3) and end_offsets "
+            f"({len(end_parents)}, 3); they have {found[0]}, {found[1]}, {found[2]} and {ends} rows."
+        )
     offsets = offsets.to(rotations)
     # The batch lies last and contiguous: plain multiply-adds on long rows are several times faster
     # than many tiny 3 x 3 products.

@@ -48,6 +48,7 @@ KNEE = (1.0, 0.0, 0.0)
 # Axes drawn along the body's are within this of them, on average over a motion.
 _SNAP = 30.0  # degrees
 _ALONG = 3.0  # degrees between a bone and the axis along which it is drawn
+SHORT = 0.01  # metres; a shorter bone tells no direction
 _UP = torch.tensor([0.0, 1.0, 0.0])
 
 
@@ -120,18 +121,35 @@ def shortest_turn(start: Tensor, end: Tensor) -> Tensor:
 
 def bone(skeleton: Skeleton, joint: str, child: str) -> Tensor | None:
     """Where a limb's joint points in its own frame (3,): at its child or else at its end site."""
+    offset = below(skeleton, joint, child)
+    if offset is None:
+        ends = zip(skeleton.end_parents, skeleton.end_offsets, strict=True)
+        start = skeleton.roles[joint]
+        offset = next((offset for parent, offset in ends if parent == start), torch.zeros(3))
+    return offset if offset.norm() > SHORT else None
+
+
+def below(skeleton: Skeleton, joint: str, child: str) -> Tensor | None:
+    """Where a joint that hangs on another, at any depth, is in its frame, (3,) metres; else None.
+
+    Joints between, such as those that spread a twist, are as at rest.
+    """
     start, end = skeleton.roles[joint], skeleton.roles.get(child, -1)
     offset = torch.zeros(3)
-    while end > start:  # joints between, such as those that spread a twist, are straight at rest
+    while end > start:
         offset, end = offset + skeleton.offsets[end], skeleton.parents[end]
-    if end != start:
-        ends = zip(skeleton.end_parents, skeleton.end_offsets, strict=True)
-        offset = next((offset for parent, offset in ends if parent == start), torch.zeros(3))
-    return offset if offset.norm() > 0.01 else None
+    return offset if end == start else None
 
 
 def _from_stance(stance: Motion, target: Skeleton, roles: list[str]) -> dict[str, Tensor]:
-    """From a motion whose mean pose stands: limbs turned the shortest way from there."""
+    """From a motion whose mean pose stands: limbs turned the shortest way from there.
+
+    How limbs are turned about their bones is not asked: that of the stance is taken for that of the
+    target's rest pose. The elbows of `cmu` are hinges 30 degrees away from `ELBOW`, so on another
+    body its elbows keep bending 30 degrees away from there. Points are not touched by that. What
+    bends tell could be used instead, but of arms that hang straight it says little, and each clip
+    of one body would get axes of its own.
+    """
     source = stance.skeleton
     ahead = facing(stance.positions(), source)
     orientations = stance.orientations()

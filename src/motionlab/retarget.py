@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
 
 import torch
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
@@ -29,7 +30,16 @@ from .errors import RetargetError
 from .foot_planting import Foot, bridged, find_contacts, levelled, plant
 from .ik import two_bone
 from .motion import Motion
-from .rest_alignment import ELBOW, alignment, bone, rest_points, shortest_turn, stands
+from .rest_alignment import (
+    ELBOW,
+    SHORT,
+    alignment,
+    below,
+    bone,
+    rest_points,
+    shortest_turn,
+    stands,
+)
 from .skeleton import SIDES, Skeleton
 
 NEEDED = ("hips", "chest") + tuple(
@@ -37,12 +47,19 @@ NEEDED = ("hips", "chest") + tuple(
     for side in SIDES
     for part in ("upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
 )
+_BONES = tuple(
+    (f"{side}_{part}", f"{side}_{child}")
+    for side in SIDES
+    for limb in (("upper_arm", "lower_arm", "hand"), ("upper_leg", "lower_leg", "foot"))
+    for part, child in pairwise(limb)
+)
 _TOE_HEIGHT = 0.0251 / 0.8007  # of a flat foot's toe joint above the floor, in lengths of the leg
 _STRAIGHT = 0.005  # metres off the line between its ends, of the middle of a limb
 _REACH, _STRETCHED = 0.998, 0.9999  # shares of its length that a leg may be stretched to
 _SINK_TIME, _SETTLE_TIME = 0.06, 0.35  # seconds
 
 
+@torch.no_grad()
 def retarget(
     motion: Motion, skeleton: Skeleton | None = None, *, reference: Motion | None = None
 ) -> Motion:
@@ -60,13 +77,19 @@ def retarget(
     Returns
     -------
     Motion : same frame rate, name and source; `contacts` are true where heel (ankle joint) or toes
-        are held still.
+        are held still. No gradients flow.
 
     Raises
     ------
-    RetargetError : a skeleton lacks roles, its rest pose can't be used, or there is no frame.
+    RetargetError : a skeleton lacks roles or limbs, its rest pose can't be used, or there is no
+        frame.
     """
     skeleton = Skeleton.canonical() if skeleton is None else skeleton
+    if not isinstance(motion, Motion) or not isinstance(skeleton, Skeleton):
+        raise RetargetError(
+            "retarget takes a Motion and a Skeleton, not "
+            f"{type(motion).__name__} and {type(skeleton).__name__}."
+        )
     if motion.skeleton.matches(skeleton):
         return motion
     _check(motion, skeleton, reference)
@@ -81,6 +104,20 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
                 f"The {name} has no joint for {', '.join(missing)}; its joints are "
                 f"{', '.join(its.names)}. Rename them to what `Skeleton.roles` knows."
             )
+        for joint, child in _BONES:
+            offset = below(its, joint, child)
+            if offset is None or offset.norm() < SHORT:
+                raise RetargetError(
+                    f"The {name} has no bone from {joint} to {child}: the one must hang on the "
+                    f"other, at least {100 * SHORT:g} cm away."
+                )
+    if any(below(skeleton, "hips", f"{side}_upper_leg") is None for side in SIDES):
+        raise RetargetError("The target skeleton's upper legs do not hang on its hips.")
+    if any(bone(skeleton, f"{side}_foot", f"{side}_toes") is None for side in SIDES):
+        raise RetargetError(
+            "The target skeleton's feet have neither toes nor end sites, so where they stand is "
+            "not known; give them such, at least 1 cm away from the ankle."
+        )
     if not stands(skeleton):
         raise RetargetError(
             "The target skeleton's rest pose is not a person standing upright and facing +z; "
@@ -89,16 +126,19 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
     if len(motion) == 0:
         raise RetargetError(f"{motion!r} has no frame to bring to another skeleton.")
     if reference is not None and not (
-        len(reference) and reference.skeleton.names == motion.skeleton.names
+        isinstance(reference, Motion)
+        and len(reference)
+        and reference.skeleton.names == motion.skeleton.names
     ):
         raise RetargetError(
-            f"The reference {reference!r} must have a frame and the joints of {motion!r}."
+            f"The reference {reference!r} must be a motion with a frame and the joints of "
+            f"{motion!r}."
         )
 
 
 def _retarget(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> Motion:
     points, orientations = motion.positions(), motion.orientations()
-    source, roles = motion.skeleton.roles, skeleton.roles
+    source = motion.skeleton.roles
     turned = {
         role: orientations[:, source[role]] @ turn
         for role, turn in alignment(motion, skeleton, reference).items()
@@ -111,36 +151,37 @@ def _retarget(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> M
         given = None if motion.contacts is None else motion.contacts[:, 2 * i : 2 * i + 2]
         feet[side] = _foot(at, world, side, skeleton, motion.fps, given)
 
-    hips = skeleton.offsets[[roles[f"{side}_upper_leg"] for side in SIDES]]
+    legs = torch.stack([below(skeleton, "hips", f"{side}_upper_leg") for side in SIDES])
     middle = (at["left_upper_leg"] + at["right_upper_leg"]) / 2
-    root = middle - _turn(world["hips"], hips.mean(0))
+    hips = middle - _turn(world["hips"], legs.mean(0))
     # Where the floor lies, and how high the ankles, both feet agree on but for their unevenness.
-    root[:, 1] += _lift(feet.values(), motion.fps)
-    root[:, 1] -= _sink(root, world["hips"], feet, at, skeleton, motion.fps)
+    hips[:, 1] += _lift(feet.values(), motion.fps)
+    hips[:, 1] -= _sink(hips, world["hips"], feet, at, skeleton, motion.fps)
 
-    for side in SIDES:
+    for side, leg in zip(SIDES, legs, strict=True):
         foot = feet[side]
-        start = root + _turn(world["hips"], skeleton.offsets[roles[f"{side}_upper_leg"]])
+        start = hips + _turn(world["hips"], leg)
         world |= _leg(start, foot.ankle, at, world, side, skeleton)
         world |= {f"{side}_foot": foot.foot, f"{side}_toes": foot.toes}
         world |= _arm(at, world, side, motion.skeleton, skeleton, scale)
     return replace(
         motion,
         skeleton=skeleton,
-        root_positions=root,
+        # a root above the hips, as some rigs have it, goes with them
+        root_positions=hips - rest_points(skeleton)[skeleton.roles["hips"]],
         rotations=_local(world, skeleton),
         contacts=torch.cat([foot.contacts for foot in feet.values()], -1),
     )
 
 
 def _fill(turned: dict[str, Tensor], skeleton: Skeleton) -> dict[str, Tensor]:
-    """World orientations of all the target's roles; what the source lacks follows its parent."""
-    world = {}
+    """World orientations of all the target's roles; what the source lacks follows what it is on."""
+    world, names = {}, {joint: role for role, joint in skeleton.roles.items()}
     for role, joint in skeleton.roles.items():
-        above = next(
-            (name for name, j in skeleton.roles.items() if j == skeleton.parents[joint]), "hips"
-        )
-        world[role] = turned[role] if role in turned else world[above]
+        above = skeleton.parents[joint]
+        while above >= 0 and above not in names:
+            above = skeleton.parents[above]
+        world[role] = turned[role] if role in turned else world[names.get(above, "hips")]
     return world
 
 
@@ -163,7 +204,9 @@ def _foot(
     """One foot on the ground, from where it is scaled."""
     ankle, foot = at[f"{side}_foot"], world[f"{side}_foot"]
     sole = bone(skeleton, f"{side}_foot", f"{side}_toes")
-    tip = bone(skeleton, f"{side}_toes", "")
+    pointing, tip = foot, None  # where the toes point, if they are a joint
+    if f"{side}_toes" in world:
+        pointing, tip = world[f"{side}_toes"], bone(skeleton, f"{side}_toes", "")
     toes = at.get(f"{side}_toes")
     if toes is None:
         toes = ankle + _turn(foot, sole)
@@ -173,7 +216,7 @@ def _foot(
     toe_height = _TOE_HEIGHT * _length(skeleton, "leg")
     heights = torch.tensor([toe_height - float(sole[1]), toe_height])
     tip = torch.zeros(3) if tip is None else tip
-    return plant(ankle, foot, world[f"{side}_toes"], contacts, sole, tip, heights)
+    return plant(ankle, foot, pointing, contacts, sole, tip, heights)
 
 
 def _speed(at: dict[str, Tensor], fps: float) -> Tensor:
@@ -199,8 +242,8 @@ def _lift(feet: Iterable[Foot], fps: float) -> Tensor:
 
 
 def _sink(
-    root: Tensor,
     hips: Tensor,
+    orientations: Tensor,
     feet: dict[str, Foot],
     at: dict[str, Tensor],
     skeleton: Skeleton,
@@ -209,13 +252,15 @@ def _sink(
     """Metres (frames,) by which the body must come down for its legs to reach the ankles.
 
     No leg is stretched beyond `_REACH`, or beyond how far it was.
+
+    hips : (frames, 3) metres; orientations : theirs, (frames, 3, 3).
     """
     leg = _length(skeleton, "leg")
-    needed = torch.zeros(len(root))
+    needed = torch.zeros(len(hips))
     for side, foot in feet.items():
         was = (at[f"{side}_foot"] - at[f"{side}_upper_leg"]).norm(dim=-1)
         reach = was.clamp(min=_REACH * leg, max=_STRETCHED * leg)
-        start = root + _turn(hips, skeleton.offsets[skeleton.roles[f"{side}_upper_leg"]])
+        start = hips + _turn(orientations, below(skeleton, "hips", f"{side}_upper_leg"))
         way = start - foot.ankle
         level = (way[:, [0, 2]] ** 2).sum(-1)
         needed = needed.maximum(way[:, 1] - (reach**2 - level).clamp(min=0.01).sqrt())
@@ -236,7 +281,7 @@ def _leg(
     aside = _aside(at[thigh], at[shank], at[foot])
     backwards = (aside * ahead).sum(-1, keepdim=True) <= 0
     knee = _bend(aside.masked_fill(backwards, 0.0), ahead)
-    offsets = (skeleton.offsets[skeleton.roles[joint]] for joint in (shank, foot))
+    offsets = (below(skeleton, *pair) for pair in pairwise((thigh, shank, foot)))
     upper, lower = two_bone(start, ankle, knee, *offsets)
     return {thigh: upper, shank: upper @ lower}
 
@@ -252,7 +297,7 @@ def _arm(
     side_of_elbow = (world[upper].mT @ aside[..., None]).mean(0)[:, 0]
     side_of_elbow = side_of_elbow - torch.tensor([0.0, 0.0, 1e-4])
     elbow = _bend(aside, _turn(world[upper], side_of_elbow / side_of_elbow.norm()))
-    offsets = [skeleton.offsets[skeleton.roles[joint]] for joint in (lower, hand)]
+    offsets = [below(skeleton, *pair) for pair in pairwise((upper, lower, hand))]
     reach = ratio * (at[hand] - at[upper])
     first, second = two_bone(torch.zeros_like(reach), reach, elbow, *offsets, hinge=ELBOW[side])
     wanted = {upper: first, lower: first @ second}

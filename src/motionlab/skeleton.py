@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 
@@ -47,12 +47,13 @@ class Skeleton:
 
     def __post_init__(self) -> None:
         set_ = lambda name, value: object.__setattr__(self, name, value)
-        set_("names", tuple(self.names))
+        set_("names", _words(self.names, "names"))
         set_("parents", _indices(self.parents, "parents"))
         set_("offsets", _vectors(self.offsets, "offsets"))
         set_("end_parents", _indices(self.end_parents, "end_parents"))
         set_("end_offsets", _vectors(self.end_offsets, "end_offsets"))
-        set_("rotation_orders", tuple(self.rotation_orders) or ("ZXY",) * len(self.names))
+        orders = _words(self.rotation_orders, "rotation_orders")
+        set_("rotation_orders", orders or ("ZXY",) * len(self.names))
         self._check()
 
     def _check(self) -> None:
@@ -60,7 +61,7 @@ class Skeleton:
         if count == 0:
             raise SkeletonError("A skeleton needs at least one joint; `names` is empty.")
         for name in self.names:
-            if not isinstance(name, str) or not name.strip():
+            if not name.strip():
                 raise SkeletonError(f"A joint is called {name!r}; every joint needs a name.")
         if not count == len(self.parents) == len(self.offsets) == len(self.rotation_orders):
             raise SkeletonError(
@@ -117,7 +118,7 @@ class Skeleton:
         """Index of a joint by name, or by role as in ``index("left_foot")``."""
         if name in self.names:
             return self.names.index(name)
-        if name in self.roles:
+        if isinstance(name, str) and name in self.roles:
             return self.roles[name]
         raise SkeletonError(
             f"This skeleton has no joint or role {name!r}. Joints: {', '.join(self.names)}. "
@@ -236,6 +237,14 @@ class Skeleton:
         return _canonical()
 
 
+def _words(values: Sequence[str], what: str) -> tuple[str, ...]:
+    given = not isinstance(values, str) and isinstance(values, Iterable)
+    words = tuple(values) if given else (values,)
+    if not given or not all(isinstance(word, str) for word in words):
+        raise SkeletonError(f"`{what}` is {values!r}; it must be a list of words, one per joint.")
+    return words
+
+
 def _indices(values: Sequence[int], what: str) -> tuple[int, ...]:
     try:
         return tuple(operator.index(value) for value in values)
@@ -243,10 +252,14 @@ def _indices(values: Sequence[int], what: str) -> tuple[int, ...]:
         raise SkeletonError(f"`{what}` must be whole numbers, joint indices: {error}.") from error
 
 
+@torch.inference_mode(False)  # a body met while sampling must serve when training
 def _vectors(values: Tensor, what: str) -> Tensor:
     """Values as float32 (n, 3)."""
+    # an array is copied: its owner may go on writing to it
+    keep = torch.as_tensor if isinstance(values, Tensor) else torch.tensor
+    values = values.clone() if isinstance(values, Tensor) and values.is_inference() else values
     try:
-        vectors = torch.as_tensor(values, dtype=torch.float32)
+        vectors = keep(values, dtype=torch.float32)
     except (TypeError, ValueError, RuntimeError) as error:
         raise SkeletonError(f"`{what}` must be numbers, (n, 3): {error}.") from error
     if vectors.numel() == 0:

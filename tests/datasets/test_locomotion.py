@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
+import threading
+from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 import torch
 
 from motionlab import Skeleton, datasets
-from motionlab.datasets import cache, locomotion, registry
+from motionlab.datasets import cache, loader, locomotion, registry
 from motionlab.errors import DataError
 
 needs_data = pytest.mark.skipif(
     not os.environ.get("MOTIONLAB_DATA"), reason="MOTIONLAB_DATA is not set"
 )
 SOURCES = {"accad": 38, "bandai-locomotion": 1067, "cmu": 3}
+CANONICAL, PARTS = Skeleton.canonical(), ("hand", "foot", "toes")
+RESULTS = Path(__file__).parents[2] / "results"
+# Metres, of frames 20, 60, 100, by part.
+GOLDEN = [
+    [[0.0865, 0.8171, 0.5944], [-0.6823, 0.8274, 1.5389], [-1.8662, 0.8388, 1.7721]],
+    [[-0.0708, 0.1, 0.5765], [-0.7061, 0.1, 1.3694], [-1.68, 0.1, 1.6504]],
+    [[-0.0972, 0.0251, 0.6632], [-0.7785, 0.0251, 1.424], [-1.7706, 0.0251, 1.6516]],
+]
 SOME = ["Male1_B3_Walk", "Male1_C16_RunTurnRight135", "06_01", "dataset-1_run_angry_001"]
 
 
@@ -102,6 +115,89 @@ def test_mirrored_gaits_follow_their_clips():
         plain = [motion.name for motion in datasets.load("gaits", split)]
         both = [motion.name for motion in datasets.load("gaits", split, mirrored=True)]
         assert both == plain + [f"{name}_mirrored" for name in plain]
+
+
+def test_no_copy_is_in_two_splits():
+    of = {
+        split: {
+            motion.name.removesuffix("_mirrored")
+            for motion in datasets.load("gaits", split, mirrored=True)
+        }
+        for split in ("train", "val", "test")
+    }
+    assert sum(map(len, of.values())) == len(set.union(*of.values())) == len(datasets.load("gaits"))
+    performances = datasets.table("locomotion").groupby(["source", "performance"])["split"]
+    assert (performances.nunique() == 1).all()
+
+
+def test_measured_numbers_keep_what_was_promised():
+    """results/locomotion.json: of this very list of clips, and within the limits."""
+    result = json.loads((RESULTS / "locomotion.json").read_text("utf-8"))
+    clips = registry.members("locomotion")
+    facts = "\n".join(f"{clip.source} {clip.path} {clip.sha256} {clip.split}" for clip in clips)
+    assert result["data_hash"] == hashlib.sha256(facts.encode()).hexdigest()
+    assert result["sources"].keys() == SOURCES.keys()
+    for source in result["sources"].values():
+        assert source["error_cm"]["median"] <= 2
+        assert source["least_knee_bend_deg"] > 0
+        assert source["clips_that_slide_more"] == 0
+        for skate in source["skate_cm_s"].values():
+            assert skate["after"] < skate["before"]
+    timed = json.loads((RESULTS / "bench_retarget.json").read_text("utf-8"))
+    assert timed["of_limit"] < 1 and sum(timed["seconds"].values()) < 15 * 60
+
+
+def test_the_cache_format_is_that_of_this_retargeting():
+    """Cached clips know of a change only by FORMAT. If this fails because retargeting was meant to
+    change: raise FORMAT, run the experiments again, and put the new numbers here."""
+    gait = datasets.load("gaits", clips=["walk_0.8_turn_right_0.5"])[0]
+    small = replace(
+        gait,
+        skeleton=replace(gait.skeleton, offsets=0.8 * gait.skeleton.offsets),
+        root_positions=0.8 * gait.root_positions,
+        contacts=None,
+    )
+    points = locomotion.bring(replace(small, source="made")).positions()
+    hand, ankle, toes = (points[[20, 60, 100], CANONICAL.index(f"left_{part}")] for part in PARTS)
+    assert locomotion.FORMAT == 4
+    expected = torch.tensor(GOLDEN)
+    torch.testing.assert_close(torch.stack([hand, ankle, toes]), expected, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("clips", [5, ["stand", 5], [["stand"]]])
+def test_clips_are_names(clips):
+    for name in ("gaits", "locomotion"):
+        with pytest.raises(DataError, match="must be a list of names"):
+            datasets.load(name, clips=clips)
+
+
+def test_loads_that_overlap_give_the_threads_back():
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    first_is_in, second_is_in, first_is_out = (threading.Event() for _ in range(3))
+
+    def first():
+        with loader._one_thread():
+            first_is_in.set()
+            second_is_in.wait(5)
+        first_is_out.set()
+
+    def second():
+        first_is_in.wait(5)
+        with loader._one_thread():
+            second_is_in.set()
+            first_is_out.wait(5)
+            assert torch.get_num_threads() == 1
+
+    try:
+        loads = [threading.Thread(target=load) for load in (first, second)]
+        for load in loads:
+            load.start()
+        for load in loads:
+            load.join()
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(before)
 
 
 def test_contacts_survive_packing():

@@ -97,6 +97,19 @@ def test_sampling_first_does_not_spoil_training(make, gait):
     assert features.grad.abs().sum() > 0
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_a_body_met_while_sampling_serves_in_training(make, gait, dtype):
+    """Skeleton, mean pose and encoding, all made in inference mode."""
+    with torch.inference_mode():
+        s = gait.skeleton
+        body = replace(s, names=("Pelvis", *s.names[1:]), offsets=1.1 * s.offsets)
+        encoding = encodings.from_config(make(body).config())
+        features = encoding.encode(replace(gait, skeleton=body))[:4]
+    features = features.clone().to(dtype).requires_grad_()
+    (encoding.positions(features).sum() + encoding.end_effectors(features).sum()).backward()
+    assert features.grad.abs().sum() > 0
+
+
 def test_input_is_left_alone(make, gait):
     encoding = make(gait.skeleton)
     rotations, places = gait.rotations.clone(), gait.root_positions.clone()
@@ -146,6 +159,9 @@ def test_wrong_features(make, gait, method):
     if method == "to_motion":
         with pytest.raises(EncodingError, match=r"needs \(frames"):
             decode(good[None])
+    if "contacts" in encoding.slices:
+        with pytest.raises(EncodingError, match="needs"):
+            encoding.contacts(good[:, 1:])
 
 
 @pytest.mark.parametrize(
@@ -171,14 +187,19 @@ def test_wrong_rates(kind, fps):
 
 def test_wrong_settings(real_motions):
     skeleton = Skeleton.canonical()
-    with pytest.raises(EncodingError, match="'vector', 'euler', '6d'"):
-        JointAngles(skeleton, rotation="quaternion")
-    for pose in (torch.eye(3), torch.zeros(21, 3, 3), "T"):
+    for kind in (JointAngles, RootRelative, BodyFrame):
+        with pytest.raises(EncodingError, match=f"{kind.__name__} is made from a Skeleton"):
+            kind("canonical")
+    for rotation in ("quaternion", ["6d"], None):
+        with pytest.raises(EncodingError, match="'vector', 'euler', '6d'"):
+            JointAngles(skeleton, rotation=rotation)
+    mirrored = torch.diag(torch.tensor([-1.0, 1, 1])).expand(21, 3, 3)
+    for pose in (torch.eye(3), torch.zeros(21, 3, 3), mirrored, "T"):
         with pytest.raises(EncodingError, match="mean_pose"):
             JointAngles(skeleton, mean_pose=pose)
     with pytest.raises(EncodingError, match="'absolute', 'difference'"):
         RootRelative(skeleton, height="low")
-    for stature in (0, -1.54, torch.inf):
+    for stature in (0, -1.54, torch.inf, torch.nan, "tall"):
         with pytest.raises(EncodingError, match="stature"):
             RootRelative(skeleton, stature=stature)
     lying = real_motions["bandai-locomotion"][0].skeleton  # all bones along one axis at rest

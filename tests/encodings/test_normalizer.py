@@ -75,6 +75,14 @@ def test_batched_differentiable_and_in_double():
     assert torch.autograd.gradcheck(lambda v: both.inverse(both(v)), values)
 
 
+def test_one_fitted_while_sampling_serves_in_training():
+    with torch.inference_mode():
+        normalizer = Normalizer.fit([rows(50, 0)])
+    values = rows(3, 2).requires_grad_()
+    normalizer.inverse(normalizer(values)).sum().backward()
+    assert values.grad.isfinite().all()
+
+
 def test_bad_input():
     good = rows(5, 0)
     nan = good.clone()
@@ -82,9 +90,15 @@ def test_bad_input():
     for clips in ([], good, [good, good[:, :3]], [good[0]], [good[:0]], [nan], ["walk"], None):
         with pytest.raises(EncodingError, match="Normalizer"):
             Normalizer.fit(clips)
+    for floor in (-1e-3, torch.nan, "low", None):
+        with pytest.raises(EncodingError, match="floor"):
+            Normalizer.fit([good], floor)
     normalizer = Normalizer.fit([good])
-    for bad in (good[:, :4], torch.zeros(3, 7)):
-        with pytest.raises(EncodingError, match=r"needs \(\.\.\., 6\)"):
+    for bad in (good.numpy(), "walk"):
+        with pytest.raises(EncodingError, match="needs a tensor"):
             normalizer(bad)
-    with pytest.raises(EncodingError, match=r"needs \(\.\.\., 4\)"):
+    for bad in (good[:, :4], torch.zeros(3, 7)):
+        with pytest.raises(EncodingError, match=r"needs a tensor \(\.\.\., 6\)"):
+            normalizer(bad)
+    with pytest.raises(EncodingError, match=r"needs a tensor \(\.\.\., 4\)"):
         normalizer.inverse(good)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from importlib.resources import files
+from pathlib import Path
 
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionlab import Motion, Skeleton, concatenate, encodings
+from motionlab import Motion, Skeleton, concatenate, datasets, encodings
 from motionlab.encodings import BodyFrame, JointAngles, RootRelative
 from motionlab.kinematics import heading
 
@@ -196,3 +198,24 @@ def test_seventy_three_numbers_of_which_seventy_vary(gait):
     assert {encoding.feature_names[i] for i in dropped} == {"root_x", "root_z", "tilt_y"}
     assert JointAngles(Skeleton.canonical(), contacts=True).dim == 68
     assert RootRelative(Skeleton.canonical()).dim == 78
+
+
+def test_the_default_is_what_was_measured_best():
+    """Of the ways to write a rotation with as many numbers as it has freedom."""
+    path = Path(__file__).parents[2] / "results" / "encoding_rotations.json"
+    rows = json.loads(path.read_text("utf-8"))["encodings"]
+    smooth = {name: row for name, row in rows.items() if row["jumps"] == 0 and row["numbers"] == 66}
+    assert min(smooth, key=lambda name: smooth[name]["step_error_cm"]) == "vector, mean pose"
+    assert min(smooth, key=lambda name: smooth[name]["noise_error_cm"]) == "vector, mean pose"
+    assert rows["euler"]["jumps"] > 0
+    encoding = JointAngles(Skeleton.canonical())
+    assert encoding.rotation == "vector" and encoding.dim == 66
+
+
+def test_the_mean_pose_is_that_of_the_training_split():
+    path = files("motionlab.encodings").joinpath("mean_pose.json")
+    table = datasets.table("locomotion")
+    frames = table.frames[table["split"] == "train"].sum()
+    assert json.loads(path.read_text("utf-8"))["frames"] == 2 * frames
+    encoding = JointAngles(Skeleton.canonical())
+    assert not torch.equal(encoding.mean_pose, torch.eye(3).double().expand(21, 3, 3))

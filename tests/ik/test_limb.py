@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from motionlab.errors import IkError
 from motionlab.ik import two_bone
 
 UPPER = torch.tensor([0.0, -0.39, 0.0], dtype=torch.float64)
@@ -76,6 +77,13 @@ def test_parent_orientation_and_other_rest_directions():
     plain, *_ = limb(hip, target, knee)
     torch.testing.assert_close(end, target, rtol=0, atol=1e-9)
     torch.testing.assert_close(bent, plain, rtol=0, atol=1e-9)
+
+
+def test_bones_without_length_are_refused():
+    hip = torch.zeros(3).double()
+    for upper, lower in ((0 * UPPER, LOWER), (UPPER, 0 * LOWER), (UPPER, torch.nan * LOWER)):
+        with pytest.raises(IkError, match="no length"):
+            two_bone(hip, AHEAD, AHEAD, upper, lower)
 
 
 def test_gradients_agree_with_finite_differences():

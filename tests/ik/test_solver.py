@@ -311,13 +311,25 @@ def test_random_human_poses_stay_human(seed):
         ({"limits": "robot"}, "robot"),
         ({"limits": {"tail": 30}}, "tail"),
         ({"limits": {"lower_leg": 30}}, "pair"),
+        ({"limits": {"lower_leg": (0, "wide")}}, "pair"),
+        ({"limits": {"lower_leg": (0, 90, 150)}}, "pair"),
+        ({"limits": {"lower_leg": (150, 0)}}, "pair"),
+        ({"limits": {"spine": -5}}, "number from 0"),
+        ({"limits": {"spine": "wide"}}, "number from 0"),
+        ({"prior": -torch.eye(3)}, "determinant"),
+        ({"smooth": -1}, "smooth is -1"),
+        ({"smooth": math.nan}, "smooth is nan"),
+        ({"smooth": "very"}, "smooth is 'very'"),
+        ({"iterations": -1}, "iterations is -1"),
+        ({"iterations": 2.5}, "iterations is 2.5"),
+        ({"skeleton": "canonical"}, "takes a Skeleton"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_bad_input_is_named(options, words):
-    options = {"targets": torch.zeros(2, 26, 3), **options}
+    options = {"skeleton": CANONICAL, "targets": torch.zeros(2, 26, 3), **options}
     with pytest.raises(IkError, match=words):
-        solve(CANONICAL, options.pop("targets"), **options)
+        solve(**options)
 
 
 def test_human_limits_need_an_upright_neutral_pose(real_clips):

@@ -34,6 +34,8 @@ def test_error_is_split_into_direction_and_twist(turn, direction, twist):
 def test_shapes_must_agree():
     with pytest.raises(IkError, match="21"):
         twist_error(torch.zeros(2, 21, 3, 3), torch.zeros(2, 20, 3, 3), CANONICAL)
+    with pytest.raises(IkError, match="None"):
+        twist_error([0.0], [0.0], CANONICAL)
 
 
 def test_swing_is_the_shortest_turn():

@@ -55,6 +55,10 @@ def test_times_that_never_come():
     assert bootstrap([1.0, np.inf]).high == np.inf
 
 
+def test_intervals_are_read_without_exponents():
+    assert str(Interval(1234.5, 0.0004, float("inf"), 3)) == "1234 [0, inf]"
+
+
 def test_jackknife_of_a_mean_is_students_interval():
     ours = jackknife(list(VALUES), np.mean, confidence=0.9)
     theirs = scipy.stats.ttest_1samp(VALUES, 0).confidence_interval(0.9)

@@ -1,14 +1,16 @@
 """What must hold for every metric: units, frame rates, batches, places, and bad input."""
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from motionlab import MotionLabError, Skeleton, contacts
+from motionlab import MotionLabError, Skeleton, contacts, metrics
 from motionlab.datasets import gaits
 from motionlab.kinematics import yaw_matrix
 from motionlab.metrics import change, feet, gait, path, prediction, smoothness
@@ -58,6 +60,7 @@ CASES = {
         turns=False,
     ),
     "motion_change": Case(lambda c: change.motion_change(c.positions, c.fps), 1, 0.01),
+    "feature_change": Case(lambda c: change.feature_change(c.positions[..., 5, :], c.fps), 1, 0.01),
     "foot_skate": Case(lambda c: feet.foot_skate(slid(c), c.contacts, c.skeleton, c.fps), 1, 0.001),
     "foot_skate of found contacts": Case(
         lambda c: feet.foot_skate(c.positions, found(c), c.skeleton, c.fps),
@@ -197,15 +200,55 @@ def test_single_precision_is_enough(case):
     close(case.measure(single).double(), case.measure(here).double(), rtol=0.01, atol=0.01)
 
 
-@pytest.mark.parametrize("name", sorted(CASES.keys() - {"cadence"}))  # that takes no positions
-@pytest.mark.parametrize("bad", ["nan", "flat", "empty"])
+@every
+def test_an_interval_over_clips(case):
+    clips = [clip(seconds=4), clip(speed=3.2, seconds=4), clip(speed=0.8, seconds=4)]
+    values = [torch.as_tensor(case.measure(c)).nanmean().item() for c in clips]
+    interval = metrics.bootstrap(values)
+    assert interval.value == pytest.approx(np.mean(values)) and interval.clips == 3
+    rounding = 1e-9 * max(map(abs, values))
+    assert min(values) - rounding <= interval.low <= interval.value
+    assert interval.value <= interval.high <= max(values) + rounding
+
+
+def test_every_metric_takes_its_arguments_in_one_order():
+    """Motion, contacts, whose body or its limits, frame rate: by position or by name."""
+    order = ("contacts", "skeleton", "limits", "fps")
+    timed = [getattr(metrics, name) for name in metrics.__all__]
+    timed += [metrics.Limits.fit, metrics.Frechet.fit, metrics.Frechet.moments]
+    timed = [metric for metric in timed if inspect.isroutine(metric)]
+    for metric in timed:
+        parameters = inspect.signature(metric).parameters
+        found = [name for name in parameters if name in order]
+        if "fps" not in found:
+            continue
+        assert found == sorted(found, key=order.index), metric
+        assert all(parameters[n].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD for n in found)
+
+
+@pytest.mark.parametrize(
+    "name", ["motion_change", "npss", "foot_skate_weighted", "jerk", "speed", "cadence"]
+)
+@pytest.mark.parametrize("fps", ["30", None, 0, float("nan"), 10**400, torch.ones(2)],
+                         ids=["text", "none", "zero", "nan", "huge", "two"])  # fmt: skip
+def test_bad_rates_are_answered(name, fps):
+    with pytest.raises(MotionLabError, match="fps"):
+        CASES[name].measure(replace(clip(), fps=fps))
+
+
+@pytest.mark.parametrize(
+    "name", sorted(CASES.keys() - {"cadence", "feature_change"})
+)  # no positions
+@pytest.mark.parametrize("bad", ["nan", "flat", "empty", "no clips"])
 def test_bad_positions_are_answered(name, bad):
     here, case = clip(), CASES[name]
     positions = {
         "nan": torch.where(here.positions > 0, here.positions, torch.nan),
         "flat": here.positions[..., :2],
         "empty": here.positions[:0],
+        "no clips": here.positions[None][:0],
     }[bad]
-    broken = replace(here, positions=positions, contacts=here.contacts[: len(positions)])
+    labels = here.contacts[None][:0] if bad == "no clips" else here.contacts[: len(positions)]
+    broken = replace(here, positions=positions, contacts=labels)
     with pytest.raises(MotionLabError):
         case.measure(broken)

@@ -14,7 +14,9 @@ from motionlab.errors import MetricError
 from motionlab.io.bvh import parse_bvh
 from motionlab.metrics import (
     Limits,
+    frechet_distance,
     pose_extent,
+    repetition,
     stagnations,
     survival,
     time_to_divergence,
@@ -158,6 +160,17 @@ def test_real_clips_raise_no_alarm_and_planted_failures_do(captured):
 # -- rates, scales, batches ---------------------------------------------------------------------
 
 
+def test_rests_are_timed_alike_at_twice_the_rate_and_at_any_scale(limits):
+    scaled = Limits.fit([100 * walk(speed=s) for s in (0.8, 1.3, 3.0)], SKELETON, FPS)
+    rests = [
+        stagnations(scale * pause(walk(fps=fps), 2.0, 1.0, fps), its, fps)
+        for fps, scale, its in ((30, 1, limits), (60, 1, limits), (30, 100, scaled))
+    ]
+    assert [len(some) for some in rests] == [1, 1, 1]
+    assert rests[1][0] == pytest.approx(rests[0][0], abs=0.05)
+    assert rests[2] == rests[0]
+
+
 def test_twice_the_frame_rate_changes_little(limits):
     for kind, detector in (("freeze", time_to_freeze), ("explosion", time_to_divergence)):
         times = [
@@ -210,6 +223,32 @@ def test_bad_input_is_named(limits):
         Limits.fit([walk()[:4]], fps=FPS, skeleton=SKELETON)
     with pytest.raises(MetricError, match="NaN"):
         Limits.fit([plant(walk(), "nan", 1, FPS)], fps=FPS, skeleton=SKELETON)
+    with pytest.raises(MetricError, match="some clips hold joints"):
+        Limits.fit([walk(), walk()[:, :21]], SKELETON, FPS)
+    for detector in (time_to_freeze, time_to_divergence, stagnations):
+        with pytest.raises(MetricError, match="limits is None; make them"):
+            detector(walk(), None, FPS)
+        with pytest.raises(MetricError, match="positions must be an array"):
+            detector("walk", limits, FPS)
+
+
+def test_positions_of_a_network_that_still_remembers_gradients(limits):
+    """Their numbers can't be differentiated, and asking for them is no error (nor a warning)."""
+    clip = walk().requires_grad_()
+    assert Limits.fit([clip], SKELETON, FPS).still == pytest.approx(
+        Limits.fit([walk()], SKELETON, FPS).still
+    )
+    assert repetition(clip, SKELETON, FPS) == repetition(walk(), SKELETON, FPS)
+    assert frechet_distance([clip] * 4, [clip] * 4, SKELETON, FPS) == pytest.approx(0, abs=1e-6)
+    assert math.isinf(time_to_freeze(clip, limits, FPS))
+
+
+def test_whole_numbers_are_measured_too():
+    """Motion in whole millimetres."""
+    clip = (1000 * walk()).long()
+    limits = Limits.fit([clip], SKELETON, FPS)
+    assert math.isinf(time_to_divergence(clip, limits, FPS))
+    assert float(time_to_divergence(plant(clip, "speed", 2.0, FPS).long() * 1000, limits, FPS)) < 3
 
 
 # -- survival -----------------------------------------------------------------------------------
@@ -242,7 +281,8 @@ def test_survival_of_the_immortal_still_has_a_band():
 
 
 def test_survival_asks_for_times_and_horizon():
-    for times, horizon in (([], 1), ([np.nan], 1), ([-1.0], 1), ([1.0], 0), ([1.0], [1, 2])):
+    for times, horizon in (([], 1), ([np.nan], 1), ([-1.0], 1), ([1.0], 0), ([1.0], [1, 2]),
+                           (["late"], 1), ([1.0], "ten")):  # fmt: skip
         with pytest.raises(MetricError):
             survival(times, horizon)
 

@@ -1,5 +1,6 @@
 """Sliding, sinking and floating feet, by known amounts."""
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -186,3 +187,17 @@ def test_a_skeleton_without_feet_is_refused():
         feet.penetration(torch.zeros(4, 1, 3), ball)
     with pytest.raises(MetricError, match="height is 0"):
         feet.foot_skate_weighted(standing(), BODY, 30, height=0)
+
+
+@pytest.mark.parametrize("measure", ["foot_skate_weighted", "penetration", "floating"])
+def test_a_rest_pose_that_does_not_stand_is_refused(measure):
+    """Skeletons of raw files often float or lie: heights above their rest pose mean nothing."""
+    canonical = Skeleton.canonical()
+    offsets = canonical.offsets.clone()
+    offsets[0] = 0  # hips at the origin, feet far below
+    floats = replace(canonical, offsets=offsets)
+    positions = gaits.make(seconds=1, speed=1.3, seed=1).positions()
+    rate = {"fps": 30.0} if measure == "foot_skate_weighted" else {}
+    getattr(feet, measure)(positions, skeleton=canonical, **rate)
+    with pytest.raises(MetricError, match="does not stand on the floor"):
+        getattr(feet, measure)(positions, skeleton=floats, **rate)

@@ -131,6 +131,16 @@ def test_bad_input_is_named():
         frechet_distance([OTHERS[0] * float("nan")], REAL, **OPTIONS)
     with pytest.raises(MetricError, match="shape"):
         frechet_distance([OTHERS[0][None]], REAL, **OPTIONS)
-    stick = Skeleton(("a", "b"), (-1, 0), torch.zeros(2, 3))
+    with pytest.raises(MetricError, match="empty"):
+        Frechet.fit(REAL, SKELETON, 30).distance([])
+    for positions, skeleton, fps, words in (
+        (REAL[0], SKELETON, "30", "fps"),
+        (REAL[0], None, 30, "skeleton is None"),
+        (REAL[0][:1], SKELETON, 30, "at least 2"),
+        (REAL[0][:, :7], SKELETON, 30, "7 points"),
+    ):
+        with pytest.raises(MetricError, match=words):
+            effector_motion(positions, skeleton, fps)
+    stick = Skeleton(tuple(f"joint {i}" for i in range(26)), (-1, *range(25)), torch.zeros(26, 3))
     with pytest.raises(MotionLabError, match="left_hand"):
         frechet_distance(OTHERS, REAL, fps=30, skeleton=stick)

@@ -164,9 +164,10 @@ def test_batches_of_steps():
         (lambda p, c: gait.cadence(c[:, :3], 30), "(300, 3)"),
         (lambda p, c: gait.cadence(c, "30 fps"), "fps is '30 fps'"),
         (lambda p, c: gait.cadence(c, 30, shortest=-1), "shortest is -1"),
+        (lambda p, c: gait.cadence(c[:0], 30), "(0, 4)"),
         (lambda p, c: gait.step_length(p[1:], c, BODY, 30), "for positions (299, 26, 3)"),
     ],
-    ids=range(10),
+    ids=range(11),
 )
 def test_bad_input(call, message):
     motion = made(speed=1.4)

@@ -148,6 +148,30 @@ def test_rate_and_scale_do_not_matter():
         assert a == b or a == pytest.approx(b, abs=0.002)
 
 
+def test_a_cycle_is_the_same_at_any_rate_and_scale():
+    def rollouts(fps):
+        one, other = (gaits.make(seconds=10, fps=fps, seed=s).positions() for s in (5, 6))
+        start, period = 2 * fps, round(1.2 * fps)
+        clips = (
+            looped(one, start, period, 7),
+            torch.cat([other[:start], looped(one, start, period, 7, shift=fps // 2)[start:]]),
+            looped(other, start, period, 7),
+        )
+        return torch.stack(clips)
+
+    for fps, scale in ((30, 1), (60, 1), (30, 100)):
+        batch = scale * rollouts(fps)
+        found = loop(batch[0], SKELETON, fps)
+        assert found.period == pytest.approx(1.2, abs=0.01)
+        assert found.start == pytest.approx(2, abs=0.2)
+        assert converged(batch, SKELETON, fps).tolist() == [0, 0, 1]
+
+
+def test_a_body_without_any_movement_repeats_nothing():
+    """Not 0 / 0 either: all points in one place."""
+    assert repetition(torch.zeros(60, 26, 3), SKELETON, 30) == math.inf
+
+
 def test_batch_equals_loop():
     batch = torch.stack([walk(4, seed=seed) for seed in range(4)]).unflatten(0, (2, 2))
     together = repetition(batch, fps=30, skeleton=SKELETON)

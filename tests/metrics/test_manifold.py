@@ -131,3 +131,8 @@ def test_bad_input_is_named():
     for options in ({"fps": 0}, {"fps": 30, "window": -1}, {"fps": 30, "step": 0}):
         with pytest.raises(MetricError):
             manifold_distance(good, good, **options)
+    for step in (-1, float("nan"), "1"):
+        with pytest.raises(MetricError, match="reference_step"):
+            nearest_window_distance(good, good, 30, reference_step=step)
+    with pytest.raises(MetricError, match="quantile"):
+        replay_share(torch.ones(3), torch.ones(3), quantile=2)

@@ -72,6 +72,8 @@ def test_reads_as_numpy_interpolates(errors, fps, part):
         ([1.0, float("nan")], 30, [10], "errors[1] is NaN"),
         ([], 30, [10], "at least one frame"),
         ([1.0], -30, [10], "fps is -30"),
+        ([1.0], 30, 80, "goes from 80 to 80"),
+        ([1.0], 30, "soon", "milliseconds must be an array"),
     ],
 )
 def test_times_outside_are_refused(errors, fps, times, message):

@@ -49,6 +49,13 @@ def test_the_floor_alone_is_a_table():
     assert list(table({}, floor=FLOOR).columns) == ["skate (cm/s)", "distance"]
 
 
+def test_clips_for_which_a_metric_is_not_defined_are_left_out():
+    for statistic in (np.mean, np.median):
+        rows = {"a": {"skate (cm/s)": [3.0, np.nan, 3.0]}}
+        found = table(rows, floor=FLOOR, statistic=statistic)
+        assert found.loc["a", "skate (cm/s)"] == "3 [3, 3] *"
+
+
 def test_another_statistic():
     found = table(
         {"a": {"time": [1.0, 2.0, np.inf]}}, floor={"real": {"time": [np.inf]}}, statistic=np.median

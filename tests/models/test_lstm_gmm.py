@@ -267,11 +267,34 @@ def test_one_frame_has_no_next(model, features):
         (5, {"temperature": math.nan}),
         (5, {"component_temperature": 0.0}),
         (5, {"component_temperature": math.inf}),
+        (2.5, {}),
+        ("5", {}),
+        (5, {"temperature": "warm"}),
+        (5, {"noise": -0.1}),
+        (5, {"noise": math.nan}),
     ],
 )
 def test_generate_refuses(model, features, n, options):
     with pytest.raises(ModelError, match="generate"):
         model.generate(n, model.observe(features), **options)
+
+
+def test_generate_refuses_what_is_no_state_of_it(model, features):
+    state = model.observe(features)
+    narrow = state._replace(hidden=state.hidden[..., :8], cell=state.cell[..., :8])
+    for start in (narrow, None, features):
+        with pytest.raises(ModelError, match="no state of this model"):
+            model.generate(3, start)
+
+
+def test_features_of_another_precision_or_in_numpy(model, features):
+    logs = model.log_prob(features.float())
+    torch.testing.assert_close(logs, model.log_prob(features), rtol=1e-3, atol=1e-3)
+    assert torch.equal(model.log_prob(features.float().numpy()), logs)
+    for part, its in zip(
+        model.observe(features[0].numpy()), model.observe(features[0]), strict=True
+    ):
+        assert torch.equal(part, its)
 
 
 def test_normalizer_of_another_encoding(clips):

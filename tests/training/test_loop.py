@@ -15,7 +15,7 @@ from safetensors import safe_open
 from motionlab import Skeleton, datasets
 from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import TrainingError
-from motionlab.training import PRESETS, Prepared, build, checkpoints, loop
+from motionlab.training import PRESETS, Prepared, build, checkpoints, loop, prepared
 
 # Validation loss of the smoke run, nats a frame. Whoever changes it on purpose changes it here. Rows
 # are rotations as two columns, which do not depend on the mean pose that is fitted to real data.
@@ -196,6 +196,29 @@ def test_a_loss_that_is_no_number_stops_it(train, smoke, tmp_path, monkeypatch):
     assert facts["update"] == 10 and all(t.isfinite().all() for t in tensors.values())
 
 
+def test_killed_after_its_last_checkpoint_nothing_is_missing(train, smoke, tmp_path, monkeypatch):
+    save = loop.save_checkpoint
+
+    def killed(path, model, optimizer, facts):
+        save(path, model, optimizer, facts)
+        if facts["update"] == 10:
+            raise Stop
+
+    monkeypatch.setattr(loop, "save_checkpoint", killed)
+    with pytest.raises(Stop):
+        train(tmp_path, smoke(updates=10, validate_every=5))
+    curve = train(tmp_path, smoke(updates=10, validate_every=5))
+    assert [point["update"] for point in curve] == [5, 10]
+    assert json.loads((tmp_path / "curve.json").read_text()) == curve
+
+
+@pytest.mark.parametrize("accelerator", ["abacus", "tpu"])
+def test_a_machine_that_is_not_there(gaits, smoke, tmp_path, accelerator):
+    with pytest.raises(TrainingError, match=f"Can't train on 1 x '{accelerator}'"):
+        loop.train(build(gaits, smoke()), gaits, smoke(), tmp_path, name="x",
+                   accelerator=accelerator)  # fmt: skip
+
+
 def test_a_folder_that_cannot_be_written(train, smoke, tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(TrainingError, match="can't be written"):
@@ -203,16 +226,22 @@ def test_a_folder_that_cannot_be_written(train, smoke, tmp_path):
 
 
 def test_two_processes_share_a_batch(tmp_path, gaits, train, smoke):
-    gaits.save(tmp_path / "gaits.npz")
+    # so little to validate on that one process has nothing to do meanwhile
+    splits = tuple("test" if s == "val" else s for s in gaits.splits[:-1]) + ("val",)
+    arrays = prepared._arrays(gaits.features, gaits.lengths, gaits.names, splits, gaits.normalizer,
+                              gaits.encoding)  # fmt: skip
+    few = replace(gaits, splits=splits, hash=prepared._digest(arrays))
+    few.save(tmp_path / "gaits.npz")
     command = ["-m", "motionlab", "train", "lstm-gmm-contacts", "--preset", "smoke",
                "--data", "gaits.npz", "--out", "two", "--accelerator", "cpu", "--devices", "2"]  # fmt: skip
     done = subprocess.run(
         [sys.executable, *command],
         cwd=tmp_path, env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
+        timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     two = json.loads((tmp_path / "two" / "curve.json").read_text())
-    one = train(tmp_path / "one", smoke())
+    one = train(tmp_path / "one", smoke(), data=few)
     for mine, theirs in zip(one, two, strict=True):
         for key in ("update", "train", "val", "norm"):
             assert mine[key] == pytest.approx(theirs[key], rel=1e-3), key
@@ -239,3 +268,8 @@ def test_weights_are_arrays_with_a_header(train, smoke, tmp_path):
             checkpoints.load_weights(tmp_path / path)
     with pytest.raises(TrainingError, match="no weights of a model"):
         checkpoints.load_weights(tmp_path / "checkpoint.safetensors")
+    tensors, header = checkpoints.read_checkpoint(tmp_path / "best.safetensors")
+    del header["about"]
+    checkpoints._save(tmp_path / "mute.safetensors", tensors, header)
+    with pytest.raises(TrainingError, match="no weights of a model"):
+        checkpoints.load_weights(tmp_path / "mute.safetensors")

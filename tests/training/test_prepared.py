@@ -1,6 +1,7 @@
 """Prepared data: what is in them, and that files are whole or refused."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from motionlab.__main__ import main
 from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import DataError
 from motionlab.training import Prepared, prepare
+from motionlab.training.prepared import file_of
 
 
 def test_rows_are_the_encoded_clips(gaits):
@@ -75,8 +77,11 @@ def test_files_that_are_not_prepared_data(gaits, tmp_path):
         with pytest.raises(DataError, match="not a whole file"):
             Prepared.load(tmp_path / "half.npz")
     np.savez(tmp_path / "else.npz", a=np.zeros(3))
-    with pytest.raises(DataError, match="not a whole file"):
-        Prepared.load(tmp_path / "else.npz")
+    with (tmp_path / "array.npz").open("wb") as stream:
+        np.save(stream, np.zeros(3))
+    for name in ("else", "array"):
+        with pytest.raises(DataError, match="not a whole file"):
+            Prepared.load(tmp_path / f"{name}.npz")
 
 
 def test_a_save_that_fails_leaves_the_old_file(gaits, tmp_path, monkeypatch):
@@ -97,6 +102,20 @@ def test_a_save_that_fails_leaves_the_old_file(gaits, tmp_path, monkeypatch):
 def test_unknown_names(tmp_path):
     with pytest.raises(DataError, match="is not a folder"):
         prepare(tmp_path / "nothing")
+
+
+def test_a_folder_is_not_taken_for_the_data_set_of_its_name(tmp_path, monkeypatch):
+    folder = tmp_path / "mine" / "gaits"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(tmp_path)
+    assert file_of("gaits") == Path("runs/gaits.npz")
+    assert file_of(folder) == Path("runs/gaits-folder.npz") == file_of("mine/gaits")
+    assert file_of(tmp_path / "mine") == Path("runs/mine.npz")
+
+
+def test_a_prepared_file_may_have_any_name(gaits, tmp_path):
+    gaits.save(tmp_path / "data")
+    assert Prepared.find(tmp_path / "data").hash == gaits.hash
 
 
 def test_a_folder_of_bvh_files(tmp_path, monkeypatch):

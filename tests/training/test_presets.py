@@ -1,5 +1,6 @@
 """Learning rates and the model that a preset asks for."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -38,7 +39,8 @@ def test_the_papers_rate_falls_by_a_twentieth_an_epoch():
 @pytest.mark.parametrize(
     "other",
     [{"updates": 0}, {"batch": 0}, {"frames": 1}, {"learning_rate": 0.0}, {"noise": -0.1},
-     {"clip": 0.0}, {"warmup": -1}],
+     {"clip": 0.0}, {"warmup": -1}, {"learning_rate": math.nan}, {"noise": math.nan},
+     {"shrink": -1.0}, {"optimizer": "adamw"}, {"seed": -1}, {"seed": 10**18}],
 )  # fmt: skip
 def test_settings_that_make_no_sense(smoke, other):
     with pytest.raises(TrainingError, match=next(iter(other))):

@@ -78,6 +78,18 @@ def test_a_path_is_named_where_it_is_farthest_from_the_start(walk):
         (lambda m: plots.root_paths([]), "list of motions"),
         (lambda m: plots.root_paths([m[:1]]), "2 frames or more"),
         (lambda m: plots.feet(m[:1]), "2 frames or more"),
+        (lambda m: plots.bars([0, 1], ["a", "b"], "x", log=True), "no value that is 0"),
+        (lambda m: plots.bars([], [], "x"), "bars: there is nothing to draw"),
+        (lambda m: plots.curves({}, "x", "y"), "curves: there is nothing"),
+        (lambda m: plots.scatter({}, "x", "y"), "scatter: there is nothing"),
+        (lambda m: plots.scatter({"a": ([1], [2, 3], [1])}, "x", "y"), "1 xs, 2 ys and 1 sizes"),
+        (lambda m: plots.over_time({}, 30, "y"), "over_time: there is nothing"),
+        (lambda m: plots.over_time({"a": [1, 2]}, 0, "y"), "over_time: fps is 0"),
+        (lambda m: plots.feature_maps({}, 30, {}), "feature_maps: there is nothing"),
+        (lambda m: plots.feature_maps({"a": np.ones((9, 3))}, 30, {}), "slices in groups"),
+        (lambda m: plots.feature_maps({"a": np.ones(9)}, 30, {"a": {}}), "frames, dim"),
+        (lambda m: plots.fan({}), "fan: there is nothing"),
+        (lambda m: plots.fan({"a": np.ones((9, 2))}), r"has shape \(9, 2\)"),
     ],
 )
 def test_what_cannot_be_drawn_is_said(walk, call, message):
@@ -92,6 +104,11 @@ def test_a_disc_for_every_value_and_equal_keys_in_the_legend():
     assert first.get_sizes()[1] > second.get_sizes()[0] > first.get_sizes()[0]
     keys = [handle.get_sizes()[0] for handle in axes.get_legend().legend_handles]
     assert keys[0] == keys[1]
+
+
+def test_discs_of_size_nothing_are_dots():
+    (axes,) = plots.scatter({"a": ([1, 2], [3, 4], [0, 0])}, "x", "y").axes
+    assert (axes.collections[0].get_sizes() == 8).all()
 
 
 def test_values_over_time_are_in_seconds():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
@@ -29,17 +30,25 @@ from .registry import (
 )
 from .splits import assign
 
+_lock = threading.Lock()
+_threads_before: list[int] = []  # of loads under way; what to go back to is what the first found
+
 
 @contextmanager
 def _one_thread():
     """Let torch use one thread: a clip is too small to share, and threads that wait for each other
     cost several times more than they do."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
+    with _lock:
+        _threads_before.append(torch.get_num_threads())
+        torch.set_num_threads(1)
     try:
         yield
     finally:
-        torch.set_num_threads(threads)
+        with _lock:
+            first = _threads_before[0]
+            _threads_before.pop()
+            if not _threads_before:
+                torch.set_num_threads(first)
 
 
 @_one_thread()

@@ -187,7 +187,13 @@ def check_wanted(wanted: Iterable[str], known: Iterable[str], name: str) -> set[
     """The wanted names as a set, all of them known."""
     if isinstance(wanted, str):
         raise DataError(f"clips={wanted!r} must be a list of names: clips=[{wanted!r}].")
-    wanted, known = set(wanted), list(known)
+    listed = list(wanted) if isinstance(wanted, Iterable) else [wanted]
+    if not isinstance(wanted, Iterable) or not all(isinstance(clip, str) for clip in listed):
+        raise DataError(
+            f"clips={wanted!r} must be a list of names, such as those in "
+            f"motionlab.datasets.table({name!r})."
+        )
+    wanted, known = set(listed), list(known)
     for clip in sorted(wanted):
         if clip not in known:
             near = get_close_matches(clip, known, 3, 0.3) or known[:3]
@@ -295,7 +301,7 @@ def info(name: str) -> Info:
 
 _LOCOMOTION_TITLE = "Walking, running, turning, starting, stopping on the canonical skeleton"
 _LOCOMOTION_QUIRKS = (
-    "Retargeted and resampled to 30 frames per second when first loaded, which takes minutes.",
+    "Retargeted and resampled to 30 frames per second when first loaded, which takes a minute or two.",
     "Speeds are scaled as the legs are: by 0.87 for accad.",
 )
 

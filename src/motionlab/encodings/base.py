@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -136,15 +137,30 @@ def check_features(encoding: Encoding, features: Tensor, frames_only: bool = Fal
     return features
 
 
+def check_skeleton(kind: type, skeleton: Skeleton) -> Skeleton:
+    """The skeleton; EncodingError if it is none."""
+    if not isinstance(skeleton, Skeleton):
+        raise EncodingError(
+            f"{kind.__name__} is made from a Skeleton, such as motion.skeleton, not "
+            f"{type(skeleton).__name__}."
+        )
+    return skeleton
+
+
 def check_rate(fps: float) -> float:
     """The frame rate as a number; EncodingError if it is not a positive one."""
-    try:
-        rate = float(fps)
-    except (TypeError, ValueError):
-        rate = -1.0
-    if not 0 < rate < float("inf"):
+    rate = number(fps)
+    if not 0 < rate < math.inf:
         raise EncodingError(f"{fps!r} frames per second; it must be a positive number.")
     return rate
+
+
+def number(value: object) -> float:
+    """The value as a number; NaN if it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
 
 
 def contact_channels(motion: Motion, columns: Sequence[int]) -> Tensor:

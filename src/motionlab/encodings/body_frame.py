@@ -13,6 +13,7 @@ from .base import (
     check_features,
     check_motion,
     check_rate,
+    check_skeleton,
     contact_channels,
     motion_through,
     skeleton_config,
@@ -44,7 +45,7 @@ class BodyFrame:
     """
 
     def __init__(self, skeleton: Skeleton, fps: float = 30.0, contacts: bool = True) -> None:
-        self.skeleton, self.fps = skeleton, check_rate(fps)
+        self.skeleton, self.fps = check_skeleton(BodyFrame, skeleton), check_rate(fps)
         self.points, self.point_names = skeleton.joints, skeleton.names
         pose = 3 * (skeleton.joints - 1)
         self.slices = {"pose": slice(0, pose), "root": slice(pose, pose + _ROOT)}
@@ -113,6 +114,7 @@ class BodyFrame:
 
     def contacts(self, features: Tensor) -> Tensor | None:
         """Heels and toes (..., frames, 4) as they are; None if not carried."""
+        features = check_features(self, features)
         return features[..., self.slices["contacts"]] if "contacts" in self.slices else None
 
     def _points(self, features: Tensor) -> Tensor:

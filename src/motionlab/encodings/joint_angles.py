@@ -10,7 +10,14 @@ from ..errors import EncodingError
 from ..kinematics import heading, yaw_matrix
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .base import check_features, check_motion, check_rate, contact_channels, skeleton_config
+from .base import (
+    check_features,
+    check_motion,
+    check_rate,
+    check_skeleton,
+    contact_channels,
+    skeleton_config,
+)
 from .effectors import body_points, effector_joints, moving
 from .mean_pose import check_pose, mean_pose_of
 from .path import Start, read_start, steps_between, walk
@@ -57,9 +64,10 @@ class JointAngles:
         mean_pose: Tensor | None = None,
         contacts: bool = False,
     ) -> None:
-        if rotation not in WIDTHS:
+        if rotation not in list(WIDTHS):
             raise EncodingError(f"rotation is {rotation!r}; it must be one of {list(WIDTHS)}.")
-        self.skeleton, self.fps, self.rotation = skeleton, check_rate(fps), rotation
+        self.skeleton, self.fps = check_skeleton(JointAngles, skeleton), check_rate(fps)
+        self.rotation = rotation
         given = mean_pose is not None
         self.mean_pose = check_pose(mean_pose, skeleton) if given else mean_pose_of(skeleton)
         self.points, self.point_names = skeleton.points, skeleton.point_names
@@ -169,6 +177,7 @@ class JointAngles:
 
     def contacts(self, features: Tensor) -> Tensor | None:
         """Left and right toe (..., frames, 2) as they are; None if not carried."""
+        features = check_features(self, features)
         return features[..., self.slices["contacts"]] if "contacts" in self.slices else None
 
     def _turns(self, features: Tensor) -> tuple[Tensor, Tensor]:

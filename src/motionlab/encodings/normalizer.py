@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import torch
@@ -38,6 +39,7 @@ class Normalizer(nn.Module):
         self.register_buffer("kept", torch.arange(dim if kept is None else kept))
 
     @classmethod
+    @torch.inference_mode(False)  # made while sampling, it must serve when training
     def fit(cls, features: Sequence[Tensor], floor: float = 1e-3) -> Normalizer:
         """Mean and standard deviation over all rows of all clips.
 
@@ -50,8 +52,10 @@ class Normalizer(nn.Module):
 
         Raises
         ------
-        EncodingError : no clips, different widths, NaN or infinite values.
+        EncodingError : no clips, different widths, NaN or infinite values, or a bad floor.
         """
+        if not isinstance(floor, int | float) or not 0 <= floor < math.inf:
+            raise EncodingError(f"Normalizer.fit: floor is {floor!r}; it must be a number from 0.")
         if not isinstance(features, (list, tuple)) or not all(map(torch.is_tensor, features)):
             raise EncodingError("Normalizer.fit takes a list of features, one tensor a clip.")
         clips = list(features)
@@ -61,7 +65,7 @@ class Normalizer(nn.Module):
                 f"Normalizer.fit needs features (frames, dim) of one width; got {len(clips)} clips "
                 f"with rows of shape {sorted(widths)}."
             )
-        rows = torch.cat(clips)
+        rows = torch.cat(clips).detach()
         if len(rows) == 0 or not rows.isfinite().all():
             raise EncodingError("Normalizer.fit: no rows, or a NaN or infinite value in them.")
         wide = rows.double()
@@ -86,7 +90,8 @@ class Normalizer(nn.Module):
         return features.index_copy(-1, self.kept, values)
 
     def _check(self, features: Tensor, width: int, what: str) -> None:
-        if features.shape[-1:] != (width,):
+        if not torch.is_tensor(features) or features.shape[-1:] != (width,):
+            shape = tuple(features.shape) if torch.is_tensor(features) else type(features).__name__
             raise EncodingError(
-                f"{what} have shape {tuple(features.shape)}; this Normalizer needs (..., {width})."
+                f"{what} are {shape}; this Normalizer needs a tensor (..., {width})."
             )

@@ -12,7 +12,15 @@ from ..errors import EncodingError
 from ..kinematics import heading
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .base import check_features, check_motion, check_rate, motion_through, skeleton_config
+from .base import (
+    check_features,
+    check_motion,
+    check_rate,
+    check_skeleton,
+    motion_through,
+    number,
+    skeleton_config,
+)
 from .effectors import body_points, effector_joints, moving
 from .path import Start, read_start, total, turned, walk
 
@@ -52,9 +60,9 @@ class RootRelative:
     ) -> None:
         if height not in HEIGHTS:
             raise EncodingError(f"height is {height!r}; it must be one of {list(HEIGHTS)}.")
-        if stature is not None and not 0 < stature < math.inf:
+        if stature is not None and not 0 < number(stature) < math.inf:
             raise EncodingError(f"stature is {stature!r}; it must be a positive number of metres.")
-        self.skeleton, self.fps = skeleton, check_rate(fps)
+        self.skeleton, self.fps = check_skeleton(RootRelative, skeleton), check_rate(fps)
         self.stature, self.height = stature, height
         self._rest = body_points(skeleton, torch.eye(3).expand(skeleton.joints, 3, 3))
         self._scale = 1.0 if stature is None else stature / _standing_height(skeleton, self._rest)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from ..errors import IkError
+
 # The limb stays this share of its length short of straight, and of folded: at the limits themselves
 # the gradient of the angle is infinite.
 _MARGIN = 1e-4
@@ -41,9 +43,15 @@ def two_bone(
     Returns
     -------
     upper, lower : (..., 3, 3), local rotations of hip and knee joint.
+
+    Raises
+    ------
+    IkError : a bone without length.
     """
     upper_offset, lower_offset = upper_offset.to(hip), lower_offset.to(hip)
     thigh, shank = upper_offset.norm(), lower_offset.norm()
+    if not (thigh > 0 and shank > 0):
+        raise IkError("A limb needs two bones: one of the offsets has no length, or is NaN.")
     reach = target - hip
     distance = reach.norm(dim=-1, keepdim=True)
     along = reach / distance.clamp(min=1e-9)

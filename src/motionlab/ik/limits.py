@@ -75,10 +75,11 @@ def read_limits(limits: str | Table | None, skeleton: Skeleton, neutral: Tensor)
     hinges: dict[int, Hinge] = {}
     ranges: dict[int, float] = {}
     for part, span in table.items():
-        if part not in HUMAN or (part in _HINGES) != isinstance(span, tuple):
+        if part not in HUMAN or not _fits(span, pair=part in _HINGES):
             raise IkError(
                 f"The table of limits has {part!r}: {span!r}. Roles are {', '.join(HUMAN)}; "
-                f"{' and '.join(_HINGES)} take a pair of degrees (from, to), the others a number."
+                f"{' and '.join(_HINGES)} take a pair of degrees (from, to), the others a number "
+                "from 0."
             )
         for role in (part, *(f"{side}_{part}" for side in SIDES)):
             if role not in skeleton.roles:
@@ -88,6 +89,13 @@ def read_limits(limits: str | Table | None, skeleton: Skeleton, neutral: Tensor)
             elif hinge := _hinge(skeleton, neutral, role, span):
                 hinges[hinge.upper] = hinge
     return Limits(hinges, ranges, neutral)
+
+
+def _fits(span: float | tuple[float, float], pair: bool) -> bool:
+    """Whether this is a range: from the less to the more, or a size."""
+    ends = span if isinstance(span, tuple) else (0, span)
+    numbers = len(ends) == 2 and all(isinstance(value, int | float) for value in ends)
+    return isinstance(span, tuple) == pair and numbers and ends[0] <= ends[1]
 
 
 def _hinge(

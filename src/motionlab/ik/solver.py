@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 
@@ -60,8 +62,10 @@ def solve(
 
     Raises
     ------
-    IkError : shapes that do not fit, NaN, no frames, limits that this neutral pose does not show.
+    IkError : shapes that do not fit, NaN, no frames, settings that are no such numbers, limits
+        that this neutral pose does not show.
     """
+    _check_settings(skeleton, smooth, iterations)
     goals, weight = _check_targets(skeleton, targets, weights)
     lead, frames = targets.shape[:-3], targets.shape[-3]
     shape = (*lead, frames, skeleton.joints, 3, 3)
@@ -83,6 +87,15 @@ def solve(
         iterations=iterations,
     )
     return root.reshape(*lead, frames, 3).to(targets), rotations.reshape(shape).to(targets)
+
+
+def _check_settings(skeleton: Skeleton, smooth: float, iterations: int) -> None:
+    if not isinstance(skeleton, Skeleton):
+        raise IkError(f"solve takes a Skeleton first, not {type(skeleton).__name__}.")
+    if not isinstance(smooth, int | float) or not 0 <= smooth < math.inf:
+        raise IkError(f"smooth is {smooth!r}; it must be a number from 0 on.")
+    if not isinstance(iterations, int) or iterations < 0:
+        raise IkError(f"iterations is {iterations!r}; it must be a whole number from 0 on.")
 
 
 def _check_targets(
@@ -137,8 +150,12 @@ def _check_rotations(
         raise IkError(
             f"`{what}` must be rotation matrices of shape {shape}, not {_shape(rotations)}."
         ) from error
-    if not (matrices @ matrices.mT - torch.eye(3, dtype=torch.float64)).abs().max() < 1e-3:
-        raise IkError(f"`{what}` holds matrices that are no rotations: R R' is not the identity.")
+    skewed = (matrices @ matrices.mT - torch.eye(3, dtype=torch.float64)).abs().amax((-2, -1))
+    if not (skewed < 1e-3).all() or (torch.linalg.det(matrices) < 0).any():
+        raise IkError(
+            f"`{what}` holds matrices that are no rotations: R R' is not the identity, or the "
+            "determinant is -1."
+        )
     return matrices
 
 

@@ -26,11 +26,16 @@ def twist_error(found: Tensor, true: Tensor, skeleton: Skeleton) -> tuple[Tensor
         longest bone; NaN where no bone leaves the joint.
     twist : (..., frames, joints) degrees, 0 to 180, about that bone once the directions agree; the
         whole difference of orientation where no bone leaves the joint.
+
+    Raises
+    ------
+    IkError : rotations that are not two tensors of one such shape.
     """
     joints = skeleton.joints
-    if found.shape != true.shape or found.shape[-3:] != (joints, 3, 3):
+    shapes = [tuple(turns.shape) if torch.is_tensor(turns) else None for turns in (found, true)]
+    if shapes[0] is None or shapes[0] != shapes[1] or shapes[0][-3:] != (joints, 3, 3):
         raise IkError(
-            f"Rotations have shapes {tuple(found.shape)} and {tuple(true.shape)}; both must be "
+            f"Rotations have shapes {shapes[0]} and {shapes[1]}; both must be "
             f"(..., frames, {joints}, 3, 3)."
         )
     # Double: a rotation's angle loses half its digits near zero.

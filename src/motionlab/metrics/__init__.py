@@ -1,6 +1,7 @@
 """How good is a motion: measures with units, sources and known answers.
 
 Most are pure functions of positions (..., frames, points, 3) in metres; frame rates are arguments.
+These come in one order, by position or by name: motion, contacts, skeleton or limits, fps.
 Lower is better unless real motion says otherwise: put real against real motion beside every number
 (`table`) and an interval over clips around it (`bootstrap`; `jackknife` for distances of sets).
 
@@ -28,6 +29,7 @@ metric                            unit              what it asks
 `converged`                       groups            do rollouts end in the same motion?
 `manifold_distance`               as features       mean distance of windows to the nearest real one
 `nearest_window_distance`         as features       the same a window, and where it is: a replay?
+`replay_share`                    share             how many windows are copies of the data?
 `frechet_distance`                none              are end effectors where, and as varied as, real?
 ================================  ================  =============================================
 """

@@ -26,8 +26,11 @@ class Interval(NamedTuple):
     clips: int
 
     def __str__(self) -> str:
-        # a share of 0.00006 reads as 0, not as 6.09e-05
-        value, low, high = (f"{round(x, 3):.3g}" for x in (self.value, self.low, self.high))
+        # a share of 0.00006 reads as 0, not as 6.09e-05; a jerk of 1234 not as 1.23e+03
+        value, low, high = (
+            f"{round(x, 3):.3g}" if abs(x) < 1000 else f"{x:.0f}"
+            for x in (self.value, self.low, self.high)
+        )
         return f"{value} [{low}, {high}]"
 
 
@@ -63,7 +66,7 @@ def bootstrap(
         raise MetricError(f"bootstrap: resamples is {resamples!r}; it must be at least 1.")
     plain = statistic is np.mean
     if plain:
-        values = _numbers(values)
+        values = numbers_of(values)
     count = len(values)
     draws = np.random.default_rng(seed).integers(count, size=(resamples, count))
     if plain:
@@ -113,11 +116,11 @@ def _check_confidence(confidence: float) -> None:
         raise MetricError(f"confidence is {confidence!r}; it must lie between 0 and 1.")
 
 
-def _numbers(values: Sequence) -> np.ndarray:
-    """One number a clip, as an array; raises MetricError."""
+def numbers_of(values: Sequence) -> np.ndarray:
+    """One number a clip, as an array without NaN; raises MetricError."""
     try:
         numbers = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RuntimeError) as error:
         raise MetricError(
             f"bootstrap: values must be one number a clip, unless a statistic is given: {error}."
         ) from error

@@ -16,6 +16,7 @@ def check_positions(
     points: int | None = None,
     minimum_frames: int = 1,
     name: str = "positions",
+    finite: bool = True,
 ) -> Tensor:
     """Points of a body over time as a tensor (..., frames, points, 3).
 
@@ -25,12 +26,13 @@ def check_positions(
     points : how many points there must be; None takes any number.
     minimum_frames : how many frames the metric needs.
     name : what the argument is called in the message.
+    finite : refuse NaN and infinite values.
 
     Raises
     ------
-    MetricError : not such an array, too few frames, NaN or infinite.
+    MetricError : not such an array, empty, too few frames, NaN or infinite.
     """
-    positions = check_floats(positions, name)
+    positions = check_floats(positions, name, finite=finite)
     expected = f"(..., frames, {points or 'points'}, 3)"
     if positions.ndim < 3 or positions.shape[-1] != 3 or points not in (None, positions.shape[-2]):
         raise MetricError(
@@ -38,17 +40,24 @@ def check_positions(
             "motion.positions() gives them."
         )
     check_frames(positions.shape[-3], minimum_frames, name)
+    _check_not_empty(positions, name)
     return positions
 
 
-def check_skeleton(positions: Tensor, skeleton: Skeleton) -> Tensor:
+def check_skeleton(
+    positions: Tensor,
+    skeleton: Skeleton,
+    minimum_frames: int = 1,
+    name: str = "positions",
+    finite: bool = True,
+) -> Tensor:
     """Points of a skeleton, all or its joints alone, as `check_positions` gives them."""
-    positions = check_positions(positions)
+    positions = check_positions(positions, None, minimum_frames, name, finite)
     if not isinstance(skeleton, Skeleton):
         raise MetricError(f"skeleton is {skeleton!r}; pass the motion's own, motion.skeleton.")
     if positions.shape[-2] not in (skeleton.joints, skeleton.points):
         raise MetricError(
-            f"positions has {positions.shape[-2]} points, {skeleton!r} has {skeleton.points} of "
+            f"{name} has {positions.shape[-2]} points, {skeleton!r} has {skeleton.points} of "
             f"which {skeleton.joints} are joints; pass the skeleton that the points belong to."
         )
     return positions
@@ -64,6 +73,7 @@ def check_features(
             f"{name} has shape {tuple(features.shape)}; it must be (..., frames, {dim or 'dim'})."
         )
     check_frames(features.shape[-2], minimum_frames, name)
+    _check_not_empty(features, name)
     return features
 
 
@@ -97,7 +107,8 @@ def check_contacts(contacts: Tensor, positions: Tensor | None = None) -> Tensor:
             "contacts > 0.5."
         )
     fits = positions is None or contacts.shape[:-1] == torch.as_tensor(positions).shape[:-2]
-    if contacts.ndim < 2 or contacts.shape[-1] not in (2, 4) or not fits:
+    empty = contacts.numel() == 0
+    if contacts.ndim < 2 or contacts.shape[-1] not in (2, 4) or empty or not fits:
         of = "" if positions is None else f" for positions {tuple(positions.shape)}"
         raise MetricError(
             f"contacts has shape {tuple(contacts.shape)}{of}; it must be (..., frames, 4): left "
@@ -114,8 +125,8 @@ def check_rate(fps: float) -> float:
 def check_positive(value: float, name: str) -> float:
     """A finite number above zero; raises MetricError."""
     try:
-        number = float(value)
-    except (TypeError, ValueError):
+        number = math.nan if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, OverflowError, RuntimeError):
         number = math.nan
     if not (math.isfinite(number) and number > 0):
         raise MetricError(f"{name} is {value!r}; it must be a positive number.")
@@ -131,10 +142,12 @@ def check_frames(frames: int, minimum: int, name: str) -> None:
         )
 
 
-def check_floats(values: Tensor, name: str) -> Tensor:
-    """Finite numbers as a floating-point tensor; raises MetricError."""
+def check_floats(
+    values: Tensor, name: str, dtype: torch.dtype | None = None, finite: bool = True
+) -> Tensor:
+    """Numbers, finite ones unless said otherwise, as a floating-point tensor; raises MetricError."""
     try:
-        tensor = torch.as_tensor(values)
+        tensor = torch.as_tensor(values, dtype=dtype)
     except (TypeError, ValueError, RuntimeError) as error:
         raise MetricError(f"{name} must be an array of numbers: {error}.") from error
     if tensor.is_complex() or tensor.dtype == torch.bool:
@@ -142,9 +155,14 @@ def check_floats(values: Tensor, name: str) -> Tensor:
     if not tensor.is_floating_point():
         tensor = tensor.float()
     bad = ~torch.isfinite(tensor)
-    if bad.any():
+    if finite and bad.any():
         raise MetricError(
             f"{name}{[int(i) for i in bad.nonzero()[0]]} is NaN or infinite ({int(bad.sum())} "
             "such values in all); cut those frames out first."
         )
     return tensor
+
+
+def _check_not_empty(values: Tensor, name: str) -> None:
+    if values.numel() == 0:
+        raise MetricError(f"{name} has shape {tuple(values.shape)}: there is nothing in it.")

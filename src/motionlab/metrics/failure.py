@@ -6,8 +6,8 @@ still until the end for longer than real bodies ever do; it has diverged when it
 outside everything in the data. A model trained on dances that begin and end in a rest pose may
 rest, one trained on walking may not.
 
-    limits = Limits.fit(real, fps=30, skeleton=skeleton)
-    frozen = time_to_freeze(rollouts, fps=30, limits=limits)     # (rollouts,) seconds, inf: never
+    limits = Limits.fit(real, skeleton, fps=30)
+    frozen = time_to_freeze(rollouts, limits, fps=30)            # (rollouts,) seconds, inf: never
     curve = survival(frozen, horizon=300)
 
 acLSTM (section 4) tells permanent freezes from "short-term freezing" that recovers, by eye.
@@ -26,7 +26,7 @@ from torch.nn.functional import avg_pool1d
 
 from ..errors import MetricError
 from ..skeleton import Skeleton
-from .checks import check_positions, check_rate
+from .checks import check_positions, check_rate, check_skeleton
 from .heading_frame import heading_frame
 
 WINDOW = 0.5  # seconds over which a pose must stay in place to be still: a walk has no such time
@@ -64,21 +64,31 @@ class Limits:
     speed: float
 
     @classmethod
-    def fit(cls, clips: Sequence[Tensor], *, fps: float, skeleton: Skeleton) -> Limits:
+    def fit(cls, clips: Sequence[Tensor], skeleton: Skeleton, fps: float) -> Limits:
         """Limits from real clips: each positions (frames, points, 3), all at one frame rate.
 
-        Clips shorter than half a second are left out. Raises MetricError if none is longer.
+        Clips shorter than half a second are left out.
+
+        Raises
+        ------
+        MetricError : none is longer, wrong shapes, NaN, another skeleton, a bad rate.
         """
         fps = check_rate(fps)
-        clips = [_check(clip, skeleton, f"clips[{i}]") for i, clip in enumerate(clips)]
+        clips = [
+            check_skeleton(c, skeleton, 1, f"clips[{i}]").detach() for i, c in enumerate(clips)
+        ]
         if any(clip.ndim != 3 for clip in clips):
             raise MetricError(
                 "Limits.fit: a clip must be (frames, points, 3); give a list of them."
             )
+        if len({clip.shape[1] for clip in clips}) > 1:
+            raise MetricError(
+                "Limits.fit: some clips hold joints and some all points; give one or the other."
+            )
         clips = [clip for clip in clips if len(clip) >= _window(fps)]
         if not clips:
             raise MetricError(f"Limits.fit: no clip is {WINDOW} s or longer; give longer ones.")
-        extents = [pose_extent(clip, fps=fps, skeleton=skeleton) for clip in clips]
+        extents = [pose_extent(clip, skeleton, fps) for clip in clips]
         still = STILL * float(torch.cat(extents).median())
         pauses = [b - a for e in extents for a, b in _intervals(e < still, fps)]
         lengths = torch.cat([_bones(clip, skeleton) for clip in clips])
@@ -95,7 +105,7 @@ class Limits:
         )
 
 
-def pose_extent(positions: Tensor, *, fps: float, skeleton: Skeleton) -> Tensor:
+def pose_extent(positions: Tensor, skeleton: Skeleton, fps: float) -> Tensor:
     """How far a pose moves about within half a second: root mean square over points and frames of
     the distance from its own mean, in the unit of positions.
 
@@ -105,6 +115,10 @@ def pose_extent(positions: Tensor, *, fps: float, skeleton: Skeleton) -> Tensor:
     Returns
     -------
     (..., windows), one for each window of half a second; window t begins with frame t.
+
+    Raises
+    ------
+    MetricError : wrong shape, shorter than half a second, NaN, another skeleton, a bad rate.
     """
     fps = check_rate(fps)
     length = _window(fps)
@@ -116,7 +130,7 @@ def pose_extent(positions: Tensor, *, fps: float, skeleton: Skeleton) -> Tensor:
     return (spread.sum(1) / points).clamp(min=0).sqrt().reshape(*batch, -1)
 
 
-def time_to_freeze(positions: Tensor, *, fps: float, limits: Limits) -> Tensor:
+def time_to_freeze(positions: Tensor, limits: Limits, fps: float) -> Tensor:
     """Seconds after which a motion stands still for good, infinite if it does not.
 
     For good means until the end, and for `limits.patience` at least: a motion that stopped
@@ -125,46 +139,51 @@ def time_to_freeze(positions: Tensor, *, fps: float, limits: Limits) -> Tensor:
     Parameters
     ----------
     positions : (..., frames, points, 3). NaN and infinite frames are not still.
-    fps : frames per second.
     limits : from real motion of the same unit.
+    fps : frames per second.
 
     Returns
     -------
     (...) seconds.
+
+    Raises
+    ------
+    MetricError : wrong shape, shorter than half a second, points of another skeleton, a bad rate.
     """
-    fps, rollouts, shape = _rollouts(positions, fps, limits)
+    fps, rollouts, shape = _rollouts(positions, limits, fps)
     times = []
     for rollout in rollouts:
-        pauses = _intervals(_still(rollout, fps, limits), fps)
+        pauses = _intervals(_still(rollout, limits, fps), fps)
         start, end = pauses[-1] if pauses else (0.0, 0.0)
         for_good = abs(end - len(rollout) / fps) < 1e-9 and end - start >= limits.patience
         times.append(start if for_good else float("inf"))
     return torch.tensor(times, dtype=torch.float64).reshape(shape)
 
 
-def stagnations(positions: Tensor, *, fps: float, limits: Limits) -> list[tuple[float, float]]:
+def stagnations(positions: Tensor, limits: Limits, fps: float) -> list[tuple[float, float]]:
     """Times (start, end) in seconds during which one motion (frames, points, 3) stands still.
 
-    None is shorter than half a second. The last one is the freeze, if there is one.
+    None is shorter than half a second. The last one is the freeze, if there is one. Errors as of
+    `time_to_freeze`.
     """
-    fps, rollouts, shape = _rollouts(positions, fps, limits)
+    fps, rollouts, shape = _rollouts(positions, limits, fps)
     if shape:
         raise MetricError(
             f"stagnations: positions has shape {(*shape, *rollouts.shape[1:])}; give one motion, "
             "(frames, points, 3), at a time."
         )
-    return _intervals(_still(rollouts[0], fps, limits), fps)
+    return _intervals(_still(rollouts[0], limits, fps), fps)
 
 
-def time_to_divergence(positions: Tensor, *, fps: float, limits: Limits) -> Tensor:
+def time_to_divergence(positions: Tensor, limits: Limits, fps: float) -> Tensor:
     """Seconds after which a motion leaves what bodies do, infinite if it never does.
 
     It has left when a value is NaN or infinite, a bone is stretched, the body shrinks, the root
     is far above or below its real heights, or a point moves faster than the limit.
 
-    Parameters and result as of `time_to_freeze`.
+    Parameters, result and errors as of `time_to_freeze`; a single frame is enough.
     """
-    fps, rollouts, shape = _rollouts(positions, fps, limits)
+    fps, rollouts, shape = _rollouts(positions, limits, fps)
     times = []
     for rollout in rollouts:
         bad = ~torch.isfinite(rollout).flatten(1).all(1)
@@ -198,18 +217,21 @@ def survival(times: Sequence[float], horizon: float | Sequence[float]) -> Surviv
 
     Returns
     -------
-    Survival : from second 0 to the longest horizon. The band is Wilson's interval with the
-        number of motions that Greenwood's variance stands for (Rothman 1978); where none is
-        censored it is Wilson's binomial interval. It is not empty when no motion failed.
+    Survival : from second 0 to the longest horizon, or to the last failure if none is left. The
+        band is Wilson's interval with the number of motions that Greenwood's variance stands for
+        (Rothman 1978); where none is censored it is Wilson's binomial interval. It is not empty
+        when no motion failed.
 
     Raises
     ------
     MetricError : no motions, a time that is NaN or negative, or a horizon that is not positive.
     """
-    times = np.asarray(times, dtype=float)
+    try:
+        times, horizon = np.asarray(times, dtype=float), np.asarray(horizon, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise MetricError(f"survival: times and horizon must be seconds: {error}.") from error
     if times.ndim != 1 or len(times) == 0 or np.isnan(times).any() or (times < 0).any():
         raise MetricError("survival: times must be one number of seconds, 0 or more, a motion.")
-    horizon = np.asarray(horizon, dtype=float)
     if horizon.shape not in ((), times.shape) or not (np.isfinite(horizon) & (horizon > 0)).all():
         raise MetricError("survival: horizon must be seconds, one number or one a motion.")
     horizon = np.broadcast_to(horizon, times.shape)
@@ -238,21 +260,12 @@ def _wilson(share: np.ndarray, count: np.ndarray, z: float = 1.959964) -> tuple:
     return np.clip(middle - half, 0, share), np.clip(middle + half, share, 1)
 
 
-def _check(positions: Tensor, skeleton: Skeleton, name: str = "positions") -> Tensor:
-    positions = check_positions(positions, name=name)
-    if positions.shape[-2] not in (skeleton.joints, skeleton.points):
-        raise MetricError(
-            f"{name} has {positions.shape[-2]} points; {skeleton!r} has {skeleton.joints} joints "
-            f"and {skeleton.points} points in all. Give the skeleton of these positions."
-        )
-    return positions
-
-
-def _rollouts(positions: Tensor, fps: float, limits: Limits) -> tuple[float, Tensor, torch.Size]:
+def _rollouts(positions: Tensor, limits: Limits, fps: float) -> tuple[float, Tensor, torch.Size]:
     """Motions in a row (rollouts, frames, points, 3), not necessarily finite, and their shape."""
     fps = check_rate(fps)
-    positions = torch.as_tensor(positions)
-    _check(positions.nan_to_num(0.0, 0.0, 0.0), limits.skeleton)
+    if not isinstance(limits, Limits):
+        raise MetricError(f"limits is {limits!r}; make them from real motion, with Limits.fit.")
+    positions = check_skeleton(positions, limits.skeleton, finite=False)
     if positions.shape[-2] != len(limits.bones) + 1:
         raise MetricError(
             f"positions has {positions.shape[-2]} points and the limits were made from "
@@ -267,11 +280,11 @@ def _window(fps: float) -> int:
     return max(2, round(WINDOW * fps) + 1)
 
 
-def _still(rollout: Tensor, fps: float, limits: Limits) -> Tensor:
+def _still(rollout: Tensor, limits: Limits, fps: float) -> Tensor:
     """Bool (windows,): the pose stays in place for the half second that begins here."""
     broken = ~torch.isfinite(rollout).flatten(1).all(1)
     clean = rollout.masked_fill(broken[:, None, None], 0.0)
-    extent = pose_extent(clean, fps=fps, skeleton=limits.skeleton)
+    extent = pose_extent(clean, limits.skeleton, fps)
     touched = broken.unfold(0, _window(fps), 1).any(1)
     return (extent < limits.still) & ~touched
 

@@ -20,7 +20,7 @@ from torch import Tensor
 
 from ..errors import MetricError
 from ..skeleton import Skeleton
-from .checks import check_frames, check_positions, check_positive, check_rate
+from .checks import check_frames, check_positions, check_positive, check_rate, check_skeleton
 from .heading_frame import heading_frame
 
 EFFECTORS = (
@@ -43,9 +43,8 @@ class Moments(NamedTuple):
 def frechet_distance(
     samples: Sequence[Tensor],
     real: Sequence[Tensor],
-    *,
-    fps: float,
     skeleton: Skeleton,
+    fps: float,
     window: float = 1.0,
     components: int = 32,
 ) -> float:
@@ -56,6 +55,7 @@ def frechet_distance(
     Parameters
     ----------
     samples, real : clips of positions, each (frames, points, 3), or one tensor of them.
+    skeleton : their body.
     fps : frames per second of all of them.
     window : seconds of a window.
     components : principal components that are kept.
@@ -64,16 +64,15 @@ def frechet_distance(
     ------
     MetricError : clips that are shorter than a window, or no more windows than components.
     """
-    options = dict(fps=fps, skeleton=skeleton, window=window, components=components)
-    reference = Frechet.fit(real, **options)
-    return reference.distance([reference.moments(clip, fps=fps) for clip in _listed(samples)])
+    reference = Frechet.fit(real, skeleton, fps, window, components)
+    return reference.distance([reference.moments(clip, fps) for clip in _listed(samples)])
 
 
 @dataclass(frozen=True, eq=False)
 class Frechet:
     """Real motion to which any number of samples is compared; made by `Frechet.fit`.
 
-        reference = Frechet.fit(real, fps=30, skeleton=skeleton)
+        reference = Frechet.fit(real, skeleton, fps=30)
         moments = [reference.moments(clip, fps=30) for clip in samples]
         reference.distance(moments)
         jackknife(moments, reference.distance)          # interval over clips
@@ -94,9 +93,8 @@ class Frechet:
     def fit(
         cls,
         real: Sequence[Tensor],
-        *,
-        fps: float,
         skeleton: Skeleton,
+        fps: float,
         window: float = 1.0,
         components: int = 32,
         rate: float = 30.0,
@@ -107,7 +105,7 @@ class Frechet:
             windows, one every third of a window.
         """
         window, rate = check_positive(window, "window"), check_positive(rate, "rate")
-        clips = [_windows(clip, fps, skeleton, window, rate) for clip in _listed(real)]
+        clips = [_windows(clip, skeleton, fps, window, rate) for clip in _listed(real)]
         windows = torch.cat(clips)
         if len(windows) <= components or components < 1:
             raise MetricError(
@@ -122,9 +120,9 @@ class Frechet:
         moments = _moments((flat - mean) @ basis)
         return cls(skeleton, window, rate, scales, mean, basis, moments)
 
-    def moments(self, positions: Tensor, *, fps: float) -> Moments:
+    def moments(self, positions: Tensor, fps: float) -> Moments:
         """What the distance needs of one clip (frames, points, 3)."""
-        windows = _windows(positions, fps, self.skeleton, self.window, self.rate)
+        windows = _windows(positions, self.skeleton, fps, self.window, self.rate)
         return _moments(((windows / self.scales[:, None]).flatten(1) - self.mean) @ self.basis)
 
     def distance(self, clips: Sequence[Moments]) -> float:
@@ -154,13 +152,19 @@ def gaussian_distance(
     return max(0.0, float(apart + covariance.trace() + covariance_2.trace() - 2 * shared))
 
 
-def effector_motion(positions: Tensor, *, fps: float, skeleton: Skeleton) -> Tensor:
+def effector_motion(positions: Tensor, skeleton: Skeleton, fps: float) -> Tensor:
     """End effectors in the heading frame: (..., frames, 2, effectors * 3), positions and velocities.
 
     Hands, toes (feet where there are none) and head; in the unit of positions, and the same a
     second. Velocities are those over the ground, turned into the heading frame: a foot in contact
     has none.
+
+    Raises
+    ------
+    MetricError : wrong shape, fewer than two frames, NaN, another skeleton's points, a bad rate.
+    SkeletonError : the skeleton lacks hands, feet or head, hips or shoulders.
     """
+    positions, fps = check_skeleton(positions, skeleton, 2), check_rate(fps)
     points = [_effector(skeleton, roles) for roles in EFFECTORS]
     local, rotation = heading_frame(positions, skeleton)
     velocity = torch.gradient(positions[..., points, :], spacing=1 / fps, dim=-3)[0] @ rotation
@@ -182,18 +186,18 @@ def _listed(clips: Sequence[Tensor]) -> list[Tensor]:
 
 
 def _windows(
-    positions: Tensor, fps: float, skeleton: Skeleton, window: float, rate: float
+    positions: Tensor, skeleton: Skeleton, fps: float, window: float, rate: float
 ) -> Tensor:
     """Windows (windows, frames, 2, channels) of one clip, brought to a rate."""
-    fps, positions = check_rate(fps), check_positions(positions, minimum_frames=2).double()
+    fps, positions = check_rate(fps), check_positions(positions, minimum_frames=2)
     if positions.ndim != 3:
         raise MetricError(
             f"positions has shape {tuple(positions.shape)}; a clip is (frames, points, 3)."
         )
-    resampled = _resampled(positions, rate / fps)
+    resampled = _resampled(positions.detach().double(), rate / fps)
     length = max(2, round(window * rate))
     check_frames(len(resampled), length, f"a clip of {len(positions) / fps:.2f} s at {rate:g} fps")
-    motion = effector_motion(resampled, fps=rate, skeleton=skeleton)
+    motion = effector_motion(resampled, skeleton, rate)
     return motion.unfold(0, length, max(1, length // 3)).movedim(-1, 1)
 
 
@@ -211,7 +215,7 @@ def _moments(values: Tensor) -> Moments:
 
 
 def _sum(clips: Sequence[Moments]) -> Moments:
-    counts, totals, squares = zip(*clips, strict=True)
+    counts, totals, squares = zip(*_listed(clips), strict=True)
     return Moments(sum(counts), torch.stack(totals).sum(0), torch.stack(squares).sum(0))
 
 

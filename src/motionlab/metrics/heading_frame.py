@@ -6,6 +6,7 @@ from torch import Tensor
 
 from ..kinematics import yaw_matrix
 from ..skeleton import Skeleton
+from .checks import check_skeleton
 from .gait import facing
 
 
@@ -23,7 +24,13 @@ def heading_frame(positions: Tensor, skeleton: Skeleton) -> tuple[Tensor, Tensor
     -------
     local : (..., frames, points, 3), in the unit of positions; heights are kept.
     rotation : (..., frames, 3, 3) turns the frame's axes to the world's.
+
+    Raises
+    ------
+    MetricError : wrong shape, NaN, another skeleton's points.
+    SkeletonError : the skeleton lacks hips or shoulders.
     """
+    positions = check_skeleton(positions, skeleton)
     rotation = yaw_matrix(facing(positions, skeleton))
     ground = positions[..., :1, :] * positions.new_tensor([1.0, 0.0, 1.0])
     return (positions - ground) @ rotation, rotation

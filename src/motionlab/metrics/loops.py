@@ -5,9 +5,9 @@ ever, and from whichever start. Motion change does not see it, for the body move
 repeats itself too, but no two strides of a person are the same; a loop is a repetition far closer
 than real motion ever comes to its own past:
 
-    tolerance = loop_tolerance(real, fps=30, skeleton=skeleton)
-    found = loop(rollout, fps=30, skeleton=skeleton, tolerance=tolerance)   # period, start: seconds
-    groups = converged(rollouts, fps=30, skeleton=skeleton, tolerance=tolerance)
+    tolerance = loop_tolerance(real, skeleton, fps=30)
+    found = loop(rollout, skeleton, fps=30, tolerance=tolerance)   # period, start: seconds
+    groups = converged(rollouts, skeleton, fps=30, tolerance=tolerance)
 
 Poses are compared relative to the root in the heading frame, so a walker who circles may loop.
 Differences are root mean squares over points and frames, as a share of how far the points move
@@ -47,7 +47,7 @@ class Loop(NamedTuple):
     start: float
 
 
-def repetition(positions: Tensor, *, fps: float, skeleton: Skeleton) -> Tensor:
+def repetition(positions: Tensor, skeleton: Skeleton, fps: float) -> Tensor:
     """How near a motion's last second comes to any earlier one: difference as share of movement.
 
     0 repeats exactly, 1 is as far as poses of the motion are from their mean. People who walk or
@@ -61,7 +61,7 @@ def repetition(positions: Tensor, *, fps: float, skeleton: Skeleton) -> Tensor:
     -------
     (...), without unit; infinite where the body stands still.
     """
-    poses, fps, shape = _poses(positions, fps, skeleton)
+    poses, fps, shape = _poses(positions, skeleton, fps)
     found = []
     for pose in poses:
         ratio, _ = _recurrence(pose, fps)
@@ -69,14 +69,15 @@ def repetition(positions: Tensor, *, fps: float, skeleton: Skeleton) -> Tensor:
     return torch.tensor(found).reshape(shape)
 
 
-def loop_tolerance(clips: Sequence[Tensor], *, fps: float, skeleton: Skeleton) -> float:
+def loop_tolerance(clips: Sequence[Tensor], skeleton: Skeleton, fps: float) -> float:
     """Difference below which a repetition is a loop: 0.3 of the closest in real clips.
 
     clips : positions (frames, points, 3) each, all at one frame rate; those too short for
     `repetition` are left out. Raises MetricError if none moves for long enough.
     """
-    least = _frames(WINDOW, check_rate(fps)) + _frames(LEAST_PERIOD, fps) + 2
-    found = [repetition(c, fps=fps, skeleton=skeleton) for c in clips if len(c) >= least]
+    fps = check_rate(fps)
+    least = _frames(WINDOW + LEAST_PERIOD, fps) + 2
+    found = [repetition(c, skeleton, fps) for c in clips if len(c) >= least]
     closest = min((float(ratio) for ratio in found), default=float("inf"))
     if not np.isfinite(closest):
         raise MetricError(
@@ -85,9 +86,7 @@ def loop_tolerance(clips: Sequence[Tensor], *, fps: float, skeleton: Skeleton) -
     return CLOSER * closest
 
 
-def loop(
-    positions: Tensor, *, fps: float, skeleton: Skeleton, tolerance: float = TOLERANCE
-) -> Loop:
+def loop(positions: Tensor, skeleton: Skeleton, fps: float, tolerance: float = TOLERANCE) -> Loop:
     """The cycle on which one motion ends, if it does.
 
     Of all lags the shortest for which the motion up to its end is what it was one lag before, for
@@ -99,7 +98,7 @@ def loop(
     positions : (frames, points, 3).
     tolerance : greatest difference, a share of the movement, in every second of the repetition.
     """
-    poses, fps, shape = _poses(positions, fps, skeleton)
+    poses, fps, shape = _poses(positions, skeleton, fps)
     tolerance = check_positive(tolerance, "tolerance")
     if shape:
         raise MetricError(
@@ -126,7 +125,7 @@ def loop(
 
 
 def converged(
-    rollouts: Tensor, *, fps: float, skeleton: Skeleton, tolerance: float = TOLERANCE
+    rollouts: Tensor, skeleton: Skeleton, fps: float, tolerance: float = TOLERANCE
 ) -> Tensor:
     """Which rollouts end in the same motion: a group number (rollouts,) for each, from 0 up.
 
@@ -139,7 +138,7 @@ def converged(
     rollouts : (rollouts, frames, points, 3), from different starts; cut off what they share.
     tolerance : as of `loop`.
     """
-    poses, fps, shape = _poses(rollouts, fps, skeleton, seconds=HOLD)
+    poses, fps, shape = _poses(rollouts, skeleton, fps, seconds=HOLD)
     tolerance = check_positive(tolerance, "tolerance")
     if len(shape) != 1:
         raise MetricError(
@@ -159,11 +158,12 @@ def _frames(seconds: float, fps: float) -> int:
 
 
 def _poses(
-    positions: Tensor, fps: float, skeleton: Skeleton, seconds: float = WINDOW + LEAST_PERIOD
+    positions: Tensor, skeleton: Skeleton, fps: float, seconds: float = WINDOW + LEAST_PERIOD
 ) -> tuple[Tensor, float, torch.Size]:
     """Poses (motions, frames, points * 3) and the leading dimensions of the positions."""
     fps = check_rate(fps)
-    positions = check_positions(positions, minimum_frames=_frames(seconds, fps) + 2).double()
+    positions = check_positions(positions, minimum_frames=_frames(seconds, fps) + 2)
+    positions = positions.detach().double()
     pose = heading_frame(positions - positions[..., :1, :], skeleton)[0]
     return pose.reshape(-1, *pose.shape[-3:]).flatten(2), fps, positions.shape[:-3]
 
@@ -182,7 +182,8 @@ def _recurrence(pose: Tensor, fps: float) -> tuple[Tensor, Tensor]:
     variance = (back**2).cumsum(0).sum(1) / count - ((back.cumsum(0) / count[:, None]) ** 2).sum(1)
     extents = (variance.clamp(min=0) * 3 / pose.shape[1]).sqrt()
     extents[extents < MOVING * _size(pose)] = 0
-    return difference / extents[lags.round().long().clamp(min=window) - 1], lags
+    extents = extents[lags.round().long().clamp(min=window) - 1]
+    return torch.where(extents > 0, difference / extents, torch.inf), lags
 
 
 def _matches(tails: Tensor, pose: Tensor) -> tuple[Tensor, Tensor]:

@@ -42,7 +42,6 @@ class Nearest(NamedTuple):
 def manifold_distance(
     samples: Sequence[Tensor],
     real: Sequence[Tensor],
-    *,
     fps: float,
     window: float = 4 / 3,
     step: float = 1 / 3,
@@ -74,7 +73,6 @@ def manifold_distance(
 def nearest_window_distance(
     samples: Sequence[Tensor],
     reference: Sequence[Tensor],
-    *,
     fps: float,
     window: float = 4 / 3,
     step: float = 1 / 3,
@@ -105,7 +103,10 @@ def nearest_window_distance(
     length = max(1, round(check_positive(window, "window") * fps))
     stride = max(1, round(check_positive(step, "step") * fps))
     reference_stride = stride
-    if reference_step is not None:
+    if reference_step == 0:
+        reference_stride = 1
+    elif reference_step is not None:
+        reference_step = check_positive(reference_step, "reference_step")
         reference_stride = max(1, round(reference_step * fps))
     ours, at, clip, time = _windows(samples, "samples", length, stride)
     theirs, there, match_clip, match_time = _windows(
@@ -123,7 +124,13 @@ def replay_share(samples: Tensor, held_out: Tensor, quantile: float = 0.01) -> f
     Both are distances to the training windows, ``nearest_window_distance(...).distance``: of
     samples, and of real clips that were held out. Real motion scores about `quantile`, a replay
     of training clips 1; a model that copies scores in between.
+
+    Raises
+    ------
+    MetricError : no distances, or a quantile that is not between 0 and 1.
     """
+    if not 0 <= quantile <= 1:
+        raise MetricError(f"replay_share: quantile is {quantile!r}; it must lie between 0 and 1.")
     if len(samples) == 0 or len(held_out) == 0:
         raise MetricError("replay_share: no windows to compare; give distances of one or more.")
     limit = np.quantile(np.asarray(held_out), quantile)

@@ -89,11 +89,11 @@ def at_milliseconds(
         raise MetricError(
             f"errors has shape {tuple(errors.shape)}; it must be (..., frames), at least one frame."
         )
-    when = check_floats(torch.as_tensor(milliseconds, dtype=torch.float64), "milliseconds")
-    when, frames = when.reshape(-1) * fps / 1000, errors.shape[-1]
+    times = check_floats(milliseconds, "milliseconds", torch.float64).reshape(-1)
+    when, frames = times * fps / 1000, errors.shape[-1]
     if len(when) and (when.min() < 0 or when.max() > frames + 1e-6):
         raise MetricError(
-            f"milliseconds goes from {min(milliseconds):g} to {max(milliseconds):g}, but the "
+            f"milliseconds goes from {float(times.min()):g} to {float(times.max()):g}, but the "
             f"errors reach from 0 to {1000 * frames / fps:g} ms; predict longer or ask for less."
         )
     errors = torch.nn.functional.pad(errors, (1, 0))

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import MetricError
-from .bootstrap import Interval, bootstrap
+from .bootstrap import Interval, bootstrap, numbers_of
 
 Row = Mapping[str, Sequence[float] | Interval]
 
@@ -25,7 +25,8 @@ def table(
     Parameters
     ----------
     rows : ``{"acLSTM": {"foot skate (cm/s)": values, ...}, ...}``: for each metric one value a
-        clip, from which the interval is drawn, or an `Interval` for a metric of whole sets.
+        clip, from which the interval is drawn (NaN is left out), or an `Interval` for a metric of
+        whole sets.
     floor : rows of the same metrics, of real motion: one half of the clips, the other half; for
         distances from real motion that of one half from the other. What lies within them is
         not to be told from real.
@@ -67,7 +68,9 @@ def table(
 
 
 def _interval(values: Sequence[float] | Interval, statistic: Callable, seed: int) -> Interval:
-    return values if isinstance(values, Interval) else bootstrap(values, statistic, seed=seed)
+    if isinstance(values, Interval):
+        return values
+    return bootstrap(numbers_of(values), statistic, seed=seed)
 
 
 def _cell(interval: Interval | None, marked: bool, low: float, high: float) -> str:

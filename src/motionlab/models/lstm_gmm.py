@@ -7,6 +7,7 @@ Motion Synthesis and Control*, section 4.1.
 from __future__ import annotations
 
 import math
+from numbers import Integral, Real
 from typing import NamedTuple
 
 import torch
@@ -54,6 +55,9 @@ class Mixture(NamedTuple):
     ) -> Tensor:
         """One draw (..., kept): first a component, then a point from its Gaussian.
 
+        Parameters
+        ----------
+        generator : source of chance.
         temperature : factor on the standard deviations.
         component_temperature : divides the logarithms of the weights; towards 0 the likeliest
             component always wins.
@@ -127,7 +131,8 @@ class LstmGmm(nn.Module):
 
     def log_prob(self, features: Tensor, noise: Tensor | None = None) -> Tensor:
         """Log-likelihood (batch, frames - 1) of each frame but the first, given those before it."""
-        if self._checked(features).shape[1] < 2:
+        features = self._checked(features)
+        if features.shape[1] < 2:
             raise ModelError("log_prob needs at least 2 frames: the first one is given.")
         before = None if noise is None else noise[:, :-1]
         return self(features[:, :-1], before).log_prob(self.normalizer(features[:, 1:]))
@@ -167,6 +172,7 @@ class LstmGmm(nn.Module):
 
     def observe(self, features: Tensor) -> State:
         """The state after features (batch, frames, dim), or (frames, dim) for a batch of one."""
+        features = torch.as_tensor(features)
         features = self._checked(features[None] if features.ndim == 2 else features)
         return self._run(features, self.zero_state(len(features)), None)[1]
 
@@ -192,6 +198,8 @@ class LstmGmm(nn.Module):
     ) -> Tensor:
         """Motion that goes on from a state: n frames (batch, n, dim), each fed back to get the next.
 
+        Differentiable, and so it remembers every step: put long motions in ``torch.no_grad()``.
+
         Parameters
         ----------
         n : frames.
@@ -204,14 +212,19 @@ class LstmGmm(nn.Module):
 
         Raises
         ------
-        ModelError : n is not a positive number, or a temperature is not above zero.
+        ModelError : n is not a whole number above zero, a temperature is not above zero, the noise
+            is negative, or the state is another model's.
         """
-        if n < 1:
-            raise ModelError(f"generate: {n} frames; ask for 1 or more.")
+        if not isinstance(n, Integral) or n < 1:
+            raise ModelError(f"generate: {n!r} frames; ask for 1 or more.")
         for what, value in [("temperature", temperature), ("component_temperature",
                             component_temperature)]:  # fmt: skip
-            if not 0 < value < float("inf"):
-                raise ModelError(f"generate: {what} is {value}; it must be a number above 0.")
+            if not isinstance(value, Real) or not 0 < value < math.inf:
+                raise ModelError(f"generate: {what} is {value!r}; it must be a number above 0.")
+        if not isinstance(noise, Real) or not 0 <= noise < math.inf:
+            raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")
+        if not isinstance(start, State) or start.hidden.shape[1:] != (2, self.width):
+            raise ModelError("generate: start is no state of this model; `observe` gives one.")
         mixture, state, frames = self.predict(start), start, []
         for _ in range(n):
             x = self.normalizer.inverse(
@@ -241,6 +254,7 @@ class LstmGmm(nn.Module):
         return cls(encoding, normalizer, config["width"], config["components"])
 
     def _checked(self, features: Tensor) -> Tensor:
+        features = torch.as_tensor(features).to(self.normalizer.mean)  # its device and precision
         shape = tuple(features.shape)
         if len(shape) != 3 or shape[-1] != self.encoding.dim or 0 in shape:
             raise ModelError(

@@ -64,11 +64,11 @@ def load_weights(path: str | os.PathLike) -> tuple[nn.Module, dict]:
     try:
         model = _KINDS[header["kind"]].from_config(header["config"])
         model.load_state_dict(tensors)
+        return model, header["about"]
     except (KeyError, TypeError, RuntimeError, MotionLabError) as error:
         raise TrainingError(
             f"{path}: holds no weights of a model of motionlab ({error})."
         ) from error
-    return model, header["about"]
 
 
 def save_checkpoint(

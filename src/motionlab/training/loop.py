@@ -69,11 +69,16 @@ def train(
     Raises
     ------
     TrainingError : the folder holds another training; the loss is no longer a number; no clip is as
-        long as a window; a file can't be written.
+        long as a window; a file can't be written; there is no such accelerator.
     """
     gpu = accelerator in ("cuda", "gpu") or (accelerator == "auto" and torch.cuda.is_available())
     precision = precision or ("bf16-mixed" if gpu else "32-true")
-    fabric = Fabric(accelerator=accelerator, devices=devices, num_nodes=nodes, precision=precision)
+    try:
+        fabric = Fabric(
+            accelerator=accelerator, devices=devices, num_nodes=nodes, precision=precision
+        )
+    except (ImportError, RuntimeError, TypeError, ValueError) as error:
+        raise TrainingError(f"Can't train on {devices} x {accelerator!r}: {error}") from error
     fabric.launch()
     if preset.batch % fabric.world_size:
         raise TrainingError(
@@ -118,7 +123,7 @@ def train(
             facts["seconds"] += time.perf_counter() - since
             facts["curve"].append({
                 "update": facts["update"], "train": statistics.fmean(losses),
-                "norm": statistics.fmean(norms), "val": evaluate(fabric, network, validation),
+                "norm": statistics.fmean(norms), "val": evaluate(fabric, model, validation),
                 "seconds": facts["seconds"],
             })  # fmt: skip
             losses, norms, since = [], [], time.perf_counter()
@@ -138,14 +143,19 @@ def draw(windows: Windows, preset: Preset, update: int) -> tuple[Tensor, Tensor]
 
 
 @torch.no_grad()
-def evaluate(fabric: Fabric, network: nn.Module, batches: list[Tensor]) -> float:
-    """Mean loss over windows, without noise; the processes share the batches."""
-    network.eval()
+def evaluate(fabric: Fabric, model: nn.Module, batches: list[Tensor]) -> float:
+    """Mean loss over windows, without noise; the processes share the batches.
+
+    model : not wrapped by Fabric: a wrapped one waits for the others at every batch, and some may
+        have one batch less.
+    """
+    model.eval()
     total = torch.zeros(2)
     for batch in batches[fabric.global_rank :: fabric.world_size]:
-        loss = network.loss(batch.to(fabric.device)).item()
+        with fabric.autocast():
+            loss = model.loss(batch.to(fabric.device)).item()
         total += torch.tensor([loss * len(batch), len(batch)])
-    network.train()
+    model.train()
     loss, count = fabric.all_reduce(total.to(fabric.device), reduce_op="sum").tolist()
     return loss / count
 
@@ -175,12 +185,12 @@ def _keep(folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, fact
     curve = facts["curve"]
     if _is_best(curve):
         save_weights(folder / BEST, model, facts)
-    save_checkpoint(folder / CHECKPOINT, model, optimizer, facts)
     path = folder / "curve.json"
     try:
         write_whole(path, lambda stream: stream.write(json.dumps(curve, indent=1).encode()))
     except OSError as error:
         raise TrainingError(f"{path}: can't be written ({error.strerror}).") from error
+    save_checkpoint(folder / CHECKPOINT, model, optimizer, facts)  # last: it says that all is done
 
 
 def _check_same(path: Path, found: dict, wanted: dict) -> None:

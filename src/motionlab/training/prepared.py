@@ -94,7 +94,9 @@ class Prepared:
             raise DataError(
                 f"{path}: there is no such file; `motionlab prepare` makes it."
             ) from error
-        except (OSError, EOFError, ValueError, KeyError, RuntimeError, zipfile.BadZipFile) as error:
+        except (
+            OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError, zipfile.BadZipFile
+        ) as error:  # fmt: skip
             raise DataError(
                 f"{path}: is not a whole file of prepared motion ({error}); make it anew with "
                 "`motionlab prepare`."
@@ -106,7 +108,7 @@ class Prepared:
 
         What is made is kept in `file_of(source)`. Folders, whose clips may change, are always read.
         """
-        if Path(source).suffix == ".npz":
+        if Path(source).suffix == ".npz" or Path(source).is_file():
             return cls.load(source)
         kept = file_of(source)
         if str(source) in datasets.names() and kept.exists():
@@ -118,7 +120,10 @@ class Prepared:
 
 def file_of(source: str | os.PathLike) -> Path:
     """Where the command line keeps what it prepared of a data set or a folder."""
-    return Path("runs") / f"{Path(source).resolve().name}.npz"
+    name, known = Path(source).resolve().name, datasets.names()
+    if name in known and str(source) not in known:
+        name += "-folder"  # or it would be taken for the data set from then on
+    return Path("runs") / f"{name}.npz"
 
 
 def prepare(source: str | os.PathLike, progress: bool = False) -> Prepared:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import torch
 
@@ -12,6 +12,8 @@ from ..errors import TrainingError
 from ..models import LstmGmm
 from .checkpoints import load_weights
 from .prepared import Prepared
+
+Optimizer = Literal["adam", "rmsprop", "sgd"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Preset:
     """Gaussians in the mixture."""
     noise: float = 0.05
     """Standard deviation of the noise on the input frames, in normalised units."""
-    optimizer: Literal["adam", "rmsprop", "sgd"] = "adam"
+    optimizer: Optimizer = "adam"
     """Rule by which gradients become steps."""
     learning_rate: float = 1e-3
     """Largest learning rate."""
@@ -56,11 +58,18 @@ class Preset:
         counts = ("updates", "batch", "frames", "validate_every", "width", "components")
         if any(getattr(self, name) < 1 for name in counts) or self.frames < 2:
             raise TrainingError(f"{', '.join(counts)} must be 1 or more, frames 2 or more: {self}.")
-        if min(self.warmup, self.decay, self.noise) < 0 or min(self.learning_rate, self.clip) <= 0:
+        positive = self.learning_rate > 0 and self.clip > 0 and self.shrink > 0  # NaN is not
+        if not (positive and self.warmup >= 0 and self.decay >= 0 and self.noise >= 0):
             raise TrainingError(
-                f"warmup, decay, noise must not be negative, learning_rate and clip be positive: "
-                f"{self}."
+                "warmup, decay, noise must not be negative, learning_rate, clip and shrink be "
+                f"positive: {self}."
             )
+        if self.optimizer not in get_args(Optimizer):
+            raise TrainingError(
+                f"optimizer is {self.optimizer!r}; use one of {', '.join(get_args(Optimizer))}."
+            )
+        if not 0 <= self.seed < 2**32:
+            raise TrainingError(f"seed is {self.seed}; it must lie between 0 and 2**32.")
 
     def rate(self, update: int) -> float:
         """Learning rate of an update, counted from 0."""
@@ -70,7 +79,8 @@ class Preset:
 
 
 # smoke: seconds, for tests. table: the equal budget of all rows of a comparison. ship: what is
-# shipped. paper: as the paper has it (300 epochs of about 200 updates; its widths are not known).
+# shipped. paper: as the paper has it (300 epochs of about 200 updates; its widths are not known; it
+# clips each entry of the gradient to 5, we its norm).
 _LSTM_GMM = {
     "smoke": Preset(
         updates=40, decay=10, batch=8, frames=16, validate_every=10, width=32, warmup=5

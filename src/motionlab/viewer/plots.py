@@ -5,8 +5,9 @@ Every function returns a figure, transparent and legible on light and dark pages
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from functools import wraps
+from numbers import Real
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -23,6 +24,11 @@ from .take import check_frame
 STYLE = Path(__file__).with_name("style.mplstyle")
 # viridis without its ends, which vanish on a black or a white page
 SPEED = ListedColormap(plt.get_cmap("viridis")(np.linspace(0.3, 0.92, 128)))
+# blue below zero, red above, and the page's own colour at zero
+AROUND_ZERO = ListedColormap(
+    [(0.30, 0.53, 0.85, abs(x) ** 0.7) if x < 0 else (0.87, 0.36, 0.22, x**0.7)
+     for x in np.linspace(-1, 1, 256)]
+)  # fmt: skip
 INK = "#808080"  # as the style's text: 4:1 on white and on black
 
 
@@ -44,6 +50,18 @@ def _check_motion(plot: str, motion: Motion, frames: int = 1) -> None:
         raise ViewerError(f"{plot}: needs a Motion, not {motion!r}.")
     if len(motion) < frames:
         raise ViewerError(f"{plot}: {motion!r} is too short; it needs {frames} frames or more.")
+
+
+def _check_named(plot: str, named: Sized) -> None:
+    if len(named) == 0:
+        raise ViewerError(
+            f"{plot}: there is nothing to draw; give one name and its values or more."
+        )
+
+
+def _check_rate(plot: str, fps: float) -> None:
+    if not isinstance(fps, Real) or not 0 < fps < np.inf:
+        raise ViewerError(f"{plot}: fps is {fps!r}; it must be a positive number.")
 
 
 @styled
@@ -99,12 +117,18 @@ def _name_joints(axes, skeleton, x: np.ndarray, y: np.ndarray) -> None:
 
 @styled
 def bars(values: Sequence[float], names: Sequence[str], label: str, log: bool = False) -> Figure:
-    """One bar a name, in the given order; `label` names the quantity with its unit."""
+    """One bar a name, in the given order; `label` names the quantity with its unit.
+
+    log : a logarithmic axis, on which only values above 0 can be shown.
+    """
+    _check_named("bars", names)
     values, names = np.asarray(values, dtype=float), list(names)
     if values.shape != (len(names),):
         raise ViewerError(
             f"bars: {len(names)} names for values of shape {values.shape}; give one name a value."
         )
+    if log and not (values > 0).all():
+        raise ViewerError("bars: a logarithmic axis shows no value that is 0, negative or NaN.")
     figure, axes = plt.subplots(figsize=(7, 0.6 + 0.2 * len(values)))
     axes.barh(range(len(values)), values, color=palette.CYCLE[0], height=0.7)
     axes.set_yticks(range(len(values)), names, fontsize=9)
@@ -125,6 +149,7 @@ def curves(
     log: bool = False,
 ) -> Figure:
     """Named lines ``{name: (xs, ys)}`` over labelled axes, with a mark at every value."""
+    _check_named("curves", lines)
     figure, axes = plt.subplots()
     for index, (name, (xs, ys)) in enumerate(lines.items()):
         axes.plot(xs, ys, "o-", label=name, color=palette.color(name, index))
@@ -143,9 +168,17 @@ def curves(
 def scatter(
     groups: Mapping[str, tuple[Sequence[float], Sequence[float], Sequence[float]]], x: str, y: str
 ) -> Figure:
-    """Named clouds of discs ``{name: (xs, ys, sizes)}``; the largest size gives a disc of 1 cm."""
+    """Named clouds of discs ``{name: (xs, ys, sizes)}``; areas grow with the sizes, from a dot for
+    0 to a disc of 9 mm for the largest."""
+    _check_named("scatter", groups)
+    for name, (xs, ys, sizes) in groups.items():
+        if not len(xs) == len(ys) == len(sizes) > 0:
+            raise ViewerError(
+                f"scatter: {name!r} has {len(xs)} xs, {len(ys)} ys and {len(sizes)} sizes; give one "
+                "of each for every disc."
+            )
     figure, axes = plt.subplots(figsize=(7, 4.2))
-    largest = max(float(np.max(sizes)) for *_, sizes in groups.values())
+    largest = max(float(np.max(sizes)) for *_, sizes in groups.values()) or 1.0
     for index, (name, (xs, ys, sizes)) in enumerate(groups.items()):
         areas = 8 + 600 * np.asarray(sizes, dtype=float) / largest
         color = palette.color(name, index)
@@ -160,6 +193,8 @@ def scatter(
 @styled
 def over_time(lines: Mapping[str, Sequence[float]], fps: float, y: str) -> Figure:
     """Named lines of one value a frame, over seconds; frames that are NaN leave a gap."""
+    _check_named("over_time", lines)
+    _check_rate("over_time", fps)
     figure, axes = plt.subplots(figsize=(7.5, 3.2))
     for index, (name, values) in enumerate(lines.items()):
         values = np.asarray(values, dtype=float)
@@ -181,6 +216,13 @@ def feature_maps(maps: Mapping[str, Sequence], fps: float, groups: Mapping[str, 
     fps : frames per second.
     groups : {name: {what: slice}}, the rows that belong together, as an encoding's `slices`.
     """
+    _check_named("feature_maps", maps)
+    _check_rate("feature_maps", fps)
+    for name, features in maps.items():
+        if np.ndim(features) != 2 or name not in groups:
+            raise ViewerError(
+                f"feature_maps: {name!r} needs features (frames, dim), and its slices in groups."
+            )
     heights = [np.shape(features)[1] for features in maps.values()]
     figure, rows = plt.subplots(
         len(maps), 1, figsize=(7.5, 0.8 + 0.035 * sum(heights)), sharex=True,
@@ -189,7 +231,7 @@ def feature_maps(maps: Mapping[str, Sequence], fps: float, groups: Mapping[str, 
     for axes, (name, features) in zip(rows[:, 0], maps.items(), strict=True):
         features = np.asarray(features)
         extent = (0, len(features) / fps, features.shape[1], 0)
-        look = dict(cmap="RdBu_r", vmin=-2.5, vmax=2.5, interpolation="nearest")
+        look = dict(cmap=AROUND_ZERO, vmin=-2.5, vmax=2.5, interpolation="nearest")
         image = axes.imshow(features.T, aspect="auto", extent=extent, **look)
         middles = []
         for part in groups[name].values():
@@ -212,6 +254,12 @@ def fan(paths: Mapping[str, Sequence], truth: Sequence | None = None) -> Figure:
     paths : {name: (n, frames, 2) metres, x and z}; one picture each, all at one scale.
     truth : (frames, 2) metres, drawn over each.
     """
+    _check_named("fan", paths)
+    for name, many in paths.items():
+        if np.ndim(many) != 3 or np.shape(many)[2] != 2:
+            raise ViewerError(
+                f"fan: {name!r} has shape {np.shape(many)}; it must be (paths, frames, 2): x and z."
+            )
     figure, panels = plt.subplots(
         1, len(paths), figsize=(7.5, 4), sharex=True, sharey=True, squeeze=False
     )
