@@ -1,5 +1,7 @@
 """Pictures: what is drawn is where it should be, by both painters; videos; machines without VTK."""
 
+from dataclasses import replace
+
 import imageio_ffmpeg
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.ndimage import label
 
 from motionlab import Motion, MotionLabError, Skeleton
 from motionlab.errors import ViewerError
+from motionlab.kinematics import yaw_matrix
 from motionlab.viewer import filmstrip, still, video
 from motionlab.viewer import probe as probe_
 from motionlab.viewer.picture import Camera, Figure, Floor, Picture, capsules, unit
@@ -126,6 +129,20 @@ def test_filmstrip_of_travel_keeps_true_distances():
     assert count == 3
     near, far = np.diff(middles)
     assert far / near == pytest.approx(1.5, rel=0.03)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_body_far_from_the_origin_makes_the_same_strip(backend):
+    """A parallel view whose eye stood among the bodies drew none of them."""
+    here, yaw = stroll(36, speed=1.5), torch.tensor(-0.46)  # off the axes
+    turn = yaw_matrix(yaw)
+    rotations = here.rotations.clone()
+    rotations[:, 0] = turn @ rotations[:, 0]
+    here = replace(here, rotations=rotations, root_positions=here.root_positions @ turn.T)
+    there = replace(here, root_positions=here.root_positions + torch.tensor([-1.2, 0.0, 16.0]))
+    near, far = (filmstrip(m, 12, width=600, labels=False, backend=backend) for m in (here, there))
+    assert near.size == far.size and solid(near).mean() > 0.02
+    assert abs(solid(near).mean() - solid(far).mean()) < 0.002
 
 
 def test_labels_add_a_band_with_text():

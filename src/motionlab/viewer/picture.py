@@ -9,7 +9,7 @@ Arrays are numpy float64, metres, y up. Colours are rgb in 0..1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -68,7 +68,11 @@ class Camera:
             height = margin * max(high[1] - low[1], (high[0] - low[0]) / aspect)
             target = camera.target + middle @ camera.axes[:2]
             camera = Camera(target, self.direction, height, self.perspective)
-        return camera
+        if self.perspective:
+            return camera
+        # A parallel view looks the same from any distance, but what is behind the eye is not drawn.
+        nearest = camera.project(points)[:, 2].max()
+        return replace(camera, target=camera.target + nearest * self.direction)
 
 
 @dataclass(frozen=True)
