@@ -20,11 +20,12 @@ def clips():
     return encoding, torch.stack([encoding.encode(motion)[:60] for motion in motions[:3]])
 
 
-@pytest.fixture(scope="module")
-def model(clips):
+@pytest.fixture(scope="module", params=[0.0, 0.9], ids=["paper", "skip"])
+def model(clips, request):
     encoding, features = clips
     torch.manual_seed(0)
-    made = LstmGmm(encoding, Normalizer.fit(list(features)), width=16, components=3).double()
+    normalizer = Normalizer.fit(list(features))
+    made = LstmGmm(encoding, normalizer, width=16, components=3, skip=request.param).double()
     torch.nn.init.normal_(made.leave.weight, std=0.3)  # components that differ
     return made
 
@@ -177,6 +178,20 @@ def test_gradients_reach_features_and_state(model, features):
     assert torch.autograd.gradcheck(likelihood, (x, state.hidden, state.cell), atol=1e-4)
 
 
+@pytest.mark.parametrize("skip", [0.0, 0.4, 1.0])
+def test_a_silent_network_keeps_its_share_of_the_frame(clips, skip):
+    encoding, features = clips
+    model = LstmGmm(encoding, Normalizer.fit(list(features)), width=8, skip=skip)
+    torch.nn.init.zeros_(model.leave.weight)
+    torch.nn.init.zeros_(model.leave.bias)
+    mix, inputs = model(features), model.normalizer(features)
+    torch.testing.assert_close(mix.means[..., 2, :], skip * inputs)
+    unit = {0.0: 1.0, 0.4: 0.6, 1.0: 0.1}[skip]  # one at the paper's, never nothing
+    torch.testing.assert_close(mix.stds - model.floor, torch.full_like(mix.stds, unit))
+    torch.nn.init.constant_(model.leave.bias, 0.5)
+    torch.testing.assert_close(model(features).means[..., 2, :], skip * inputs + 0.5 * unit)
+
+
 def test_deviations_are_floored(clips):
     encoding, features = clips
     model = LstmGmm(encoding, Normalizer.fit(list(features)), width=8)
@@ -295,6 +310,18 @@ def test_features_of_another_precision_or_in_numpy(model, features):
         model.observe(features[0].numpy()), model.observe(features[0]), strict=True
     ):
         assert torch.equal(part, its)
+
+
+@pytest.mark.parametrize("skip", [-0.1, 1.1, math.nan, "all"])
+def test_a_share_is_between_nothing_and_all(clips, skip):
+    with pytest.raises(ModelError, match="skip"):
+        LstmGmm(clips[0], Normalizer(clips[0].dim), skip=skip)
+
+
+def test_weights_from_before_there_was_a_skip(model):
+    config = model.config()
+    del config["skip"]
+    assert LstmGmm.from_config(config).skip == 0
 
 
 def test_normalizer_of_another_encoding(clips):

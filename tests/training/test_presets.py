@@ -33,6 +33,7 @@ def test_rate_rises_stays_and_falls(smoke, stay, warmup, decay):
 
 def test_the_papers_rate_falls_by_a_twentieth_an_epoch():
     preset = PRESETS["lstm-gmm"]["paper"]
+    assert preset.skip == 0
     assert preset.rate(0) == 1e-3 and preset.rate(200) == pytest.approx(0.95e-3)
 
 
@@ -40,7 +41,7 @@ def test_the_papers_rate_falls_by_a_twentieth_an_epoch():
     "other",
     [{"updates": 0}, {"batch": 0}, {"frames": 1}, {"learning_rate": 0.0}, {"noise": -0.1},
      {"clip": 0.0}, {"warmup": -1}, {"learning_rate": math.nan}, {"noise": math.nan},
-     {"shrink": -1.0}, {"optimizer": "adamw"}, {"seed": -1}, {"seed": 10**18}],
+     {"shrink": -1.0}, {"skip": 1.5}, {"skip": math.nan}, {"optimizer": "adamw"}, {"seed": -1}, {"seed": 10**18}],
 )  # fmt: skip
 def test_settings_that_make_no_sense(smoke, other):
     with pytest.raises(TrainingError, match=next(iter(other))):

@@ -7,6 +7,7 @@ Motion Synthesis and Control*, section 4.1.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import NamedTuple
 
@@ -24,11 +25,23 @@ _FLOOR, _CONTACT_FLOOR = 0.01, 0.1
 
 
 class State(NamedTuple):
-    """All that the network knows after it has seen a frame (the conditions of eq. 5)."""
+    """All that the network knows after it has seen a frame (the conditions of eq. 5).
 
-    frame: Tensor  # (batch, dim), the last input frame, raw units
+    Indexed along the batch: ``state[2:5]``, one character as ``state[2]`` (a batch of one), a start
+    for a hundred futures as ``state[[2] * 100]``.
+    """
+
+    frame: Tensor  # (batch, dim), the last input frame as it was seen, raw units
     hidden: Tensor  # (batch, 2, width), h of both LSTM layers
     cell: Tensor  # (batch, 2, width), C of both LSTM layers
+
+    def __getitem__(self, rows: int | slice | Sequence[int] | Tensor) -> State:
+        if isinstance(rows, Integral):
+            size = len(self.frame)
+            if not -size <= rows < size:
+                raise IndexError(f"state {rows} of a batch of {size}")
+            rows = slice(rows % size, rows % size + 1)
+        return State(*(part[rows] for part in self))
 
 
 class Mixture(NamedTuple):
@@ -91,10 +104,19 @@ class LstmGmm(nn.Module):
     normalizer : fitted on the training split.
     width : of each hidden layer (the paper's is not known).
     components : M, Gaussians in the mixture.
+    skip : share of the present frame that goes straight into the means, from 0 to 1. With 0, the
+        paper's way, the network has to copy the body through its memory before it can move it, and
+        is long in learning to. With 1 it learns fast, but nothing pulls a motion back that has left
+        the data: each frame may be a little further off, without end.
     """
 
     def __init__(
-        self, encoding: Encoding, normalizer: Normalizer, width: int = 512, components: int = 5
+        self,
+        encoding: Encoding,
+        normalizer: Normalizer,
+        width: int = 512,
+        components: int = 5,
+        skip: float = 0.0,
     ) -> None:
         super().__init__()
         if len(normalizer.mean) != encoding.dim:
@@ -102,8 +124,13 @@ class LstmGmm(nn.Module):
                 f"The normalizer is for {len(normalizer.mean)} channels, the encoding has "
                 f"{encoding.dim}; fit it on features of this encoding."
             )
+        if not isinstance(skip, Real) or not 0 <= skip <= 1:
+            raise ModelError(f"skip is {skip!r}; it must be a share, from 0 to 1.")
         self.encoding, self.normalizer = encoding, normalizer
         self.width, self.components, self.kept = width, components, len(normalizer.kept)
+        # What is left for the network to say is about so large; it counts in this unit. Were it to
+        # count in whole ones, learning would take several times as long.
+        self.skip, self.reach = skip, max(1 - skip, 0.1)
         self.enter = nn.Sequential(
             nn.Linear(self.kept, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
         )
@@ -142,25 +169,29 @@ class LstmGmm(nn.Module):
         return -self.log_prob(features, noise).mean()
 
     def _run(self, features: Tensor, state: State, noise: Tensor | None) -> tuple[Mixture, State]:
-        inputs = self.normalizer(features)  # (batch, frames, kept)
         if noise is not None:
-            inputs = inputs + noise[..., self.normalizer.kept]
+            features = features + noise * self.normalizer.std
+        inputs = self.normalizer(features)  # (batch, frames, kept)
         memory = (
             state.hidden.transpose(0, 1).contiguous(),
             state.cell.transpose(0, 1).contiguous(),
         )
         outputs, (hidden, cell) = self.lstm(self.enter(inputs), memory)  # (batch, frames, width)
         after = State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1))
-        return self._mixture(outputs), after
+        return self._mixture(outputs, inputs), after
 
-    def _mixture(self, outputs: Tensor) -> Mixture:
-        """Numbers of any size (..., width) to weights, means and deviations (eq. 7)."""
+    def _mixture(self, outputs: Tensor, inputs: Tensor) -> Mixture:
+        """Numbers of any size (..., width) to weights, means and deviations (eq. 7).
+
+        inputs : (..., kept), the present frame, of which the means keep a share.
+        """
         # densities need more digits than half precision has
         with torch.autocast(outputs.device.type, enabled=False):
             numbers = self.leave(outputs.to(self.leave.weight.dtype))
         weights, gaussians = numbers.split([self.components, 2 * self.components * self.kept], -1)
         means, log_stds = gaussians.unflatten(-1, (2, self.components, self.kept)).unbind(-3)
-        return Mixture(weights.log_softmax(-1), means, log_stds.exp() + self.floor)
+        means = self.skip * inputs[..., None, :] + self.reach * means
+        return Mixture(weights.log_softmax(-1), means, self.reach * log_stds.exp() + self.floor)
 
     # -- one frame after the other ----------------------------------------------------------------
 
@@ -178,7 +209,7 @@ class LstmGmm(nn.Module):
 
     def predict(self, state: State) -> Mixture:
         """What may follow the frames that a state has seen: (batch, M, ...)."""
-        return self._mixture(state.hidden[:, -1])
+        return self._mixture(state.hidden[:, -1], self.normalizer(state.frame))
 
     def step(self, x: Tensor, state: State, noise: Tensor | None = None) -> tuple[Mixture, State]:
         """See one frame more, x (batch, dim): what may follow it, and the state after it."""
@@ -244,6 +275,7 @@ class LstmGmm(nn.Module):
             "kept": self.kept,
             "width": self.width,
             "components": self.components,
+            "skip": self.skip,
         }
 
     @classmethod
@@ -251,7 +283,9 @@ class LstmGmm(nn.Module):
         """A model of the right shapes, to be filled by `load_state_dict`."""
         encoding = encodings.from_config(config["encoding"])
         normalizer = Normalizer(encoding.dim, config["kept"])
-        return cls(encoding, normalizer, config["width"], config["components"])
+        return cls(
+            encoding, normalizer, config["width"], config["components"], config.get("skip", 0.0)
+        )
 
     def _checked(self, features: Tensor) -> Tensor:
         features = torch.as_tensor(features).to(self.normalizer.mean)  # its device and precision

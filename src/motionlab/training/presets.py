@@ -39,6 +39,8 @@ class Preset:
     """Width of the hidden layers."""
     components: int = 5
     """Gaussians in the mixture."""
+    skip: float = 0.9
+    """Share of the present frame that goes straight into the means; the paper's is 0."""
     noise: float = 0.05
     """Standard deviation of the noise on the input frames, in normalised units."""
     optimizer: Optimizer = "adam"
@@ -64,6 +66,8 @@ class Preset:
                 "warmup, decay, noise must not be negative, learning_rate, clip and shrink be "
                 f"positive: {self}."
             )
+        if not 0 <= self.skip <= 1:
+            raise TrainingError(f"skip is {self.skip}; it must lie between 0 and 1.")
         if self.optimizer not in get_args(Optimizer):
             raise TrainingError(
                 f"optimizer is {self.optimizer!r}; use one of {', '.join(get_args(Optimizer))}."
@@ -89,7 +93,7 @@ _LSTM_GMM = {
     "ship": Preset(updates=60_000, decay=3_000, batch=32, frames=64, validate_every=200),
     "paper": Preset(
         updates=60_000, decay=0, batch=20, frames=50, validate_every=1_000, optimizer="rmsprop",
-        warmup=0, shrink=0.95 ** (1 / 200),
+        warmup=0, shrink=0.95 ** (1 / 200), skip=0.0,
     ),
 }  # fmt: skip
 
@@ -106,7 +110,9 @@ def build(data: Prepared, preset: Preset, start: Path | None = None) -> LstmGmm:
     if start is None:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(preset.seed)
-            return LstmGmm(data.encoding, data.normalizer, preset.width, preset.components)
+            return LstmGmm(
+                data.encoding, data.normalizer, preset.width, preset.components, preset.skip
+            )
     model, _ = load_weights(start)
     if model.encoding.config() != data.encoding.config():
         raise TrainingError(
