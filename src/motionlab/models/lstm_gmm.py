@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from .. import encodings
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
+from .sampler import PRECISIONS, choose, normal, unroll
 
 # Smallest standard deviations, in normalised units. A contact is 0 or 1: a Gaussian around such a
 # value could be made as narrow, and its density as high, as one likes. With 0.1 a contact that the
@@ -75,13 +76,11 @@ class Mixture(NamedTuple):
         component_temperature : divides the logarithms of the weights; towards 0 the likeliest
             component always wins.
         """
-        shape, kept = self.log_weights.shape, self.means.shape[-1]
-        chances = (self.log_weights / component_temperature).softmax(-1)
-        chosen = torch.multinomial(chances.flatten(0, -2), 1, generator=generator)  # (all, 1)
-        chosen = chosen.reshape(*shape[:-1], 1, 1).expand(*shape[:-1], 1, kept)
+        chosen = choose(self.log_weights / component_temperature, generator)  # (...)
+        chosen = chosen[..., None, None].expand(*chosen.shape, 1, self.means.shape[-1])
         mean = self.means.gather(-2, chosen)[..., 0, :]
         std = self.stds.gather(-2, chosen)[..., 0, :]
-        return mean + temperature * std * _normal(std, generator)
+        return mean + temperature * std * normal(std, generator)
 
 
 class LstmGmm(nn.Module):
@@ -226,10 +225,12 @@ class LstmGmm(nn.Module):
         temperature: float = 1.0,
         component_temperature: float = 1.0,
         noise: float = 0.0,
+        precision: str = "full",
     ) -> Tensor:
         """Motion that goes on from a state: n frames (batch, n, dim), each fed back to get the next.
 
-        Differentiable, and so it remembers every step: put long motions in ``torch.no_grad()``.
+        Differentiable, and so it remembers every step. In ``torch.no_grad()`` it is faster (see
+        sampler.py) and draws the same motion. A character that leaves all bounds ends in NaN.
 
         Parameters
         ----------
@@ -240,11 +241,16 @@ class LstmGmm(nn.Module):
         component_temperature : the same for the choice among the M components.
         noise : standard deviation of what is added to the network's inputs, in normalised units
             (the d of section 5.1; 0.05 in training).
+        precision : of the weights. "full" is theirs. "half" draws one or a few characters in about
+            half the time, "int8" hundreds (it rounds what is multiplied, too): nearly the same
+            distribution, another motion. Both only in ``torch.no_grad()``, on x86 processors. Of
+            weights that were stored in half precision "half" loses nothing.
 
         Raises
         ------
         ModelError : n is not a whole number above zero, a temperature is not above zero, the noise
-            is negative, or the state is another model's.
+            is negative, the state is another model's or holds a NaN, or the precision is none of
+            the three or not possible here.
         """
         if not isinstance(n, Integral) or n < 1:
             raise ModelError(f"generate: {n!r} frames; ask for 1 or more.")
@@ -256,14 +262,34 @@ class LstmGmm(nn.Module):
             raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")
         if not isinstance(start, State) or start.hidden.shape[1:] != (2, self.width):
             raise ModelError("generate: start is no state of this model; `observe` gives one.")
+        if not all(part.isfinite().all() for part in start):
+            raise ModelError("generate: start holds a NaN or infinite value.")
+        if precision not in PRECISIONS:
+            raise ModelError(f"generate: precision {precision!r}; it is one of {[*PRECISIONS]}.")
+        chance = generator, temperature, component_temperature
+        if not torch.is_grad_enabled():
+            return unroll(self, n, start, *chance, noise, precision)
+        if precision != "full":
+            raise ModelError("generate: rounded weights have no gradient; use torch.no_grad().")
+        return self._generate(n, start, *chance, noise)
+
+    def _generate(
+        self,
+        n: int,
+        start: State,
+        generator: torch.Generator | None,
+        temperature: float,
+        component_temperature: float,
+        noise: float,
+    ) -> Tensor:
+        """`generate`, for reading and for gradients."""
         mixture, state, frames = self.predict(start), start, []
         for _ in range(n):
-            x = self.normalizer.inverse(
-                mixture.sample(generator, temperature, component_temperature)
-            )
-            frames.append(x)
-            disturbance = noise * _normal(x, generator) if noise else None
-            mixture, state = self.step(x, state, disturbance)
+            if frames:
+                disturbance = noise * normal(frames[-1], generator) if noise else None
+                mixture, state = self.step(frames[-1], state, disturbance)
+            normalized = mixture.sample(generator, temperature, component_temperature)
+            frames.append(self.normalizer.inverse(normalized))
         return torch.stack(frames, dim=1)
 
     # -- what is stored with the weights ----------------------------------------------------------
@@ -298,8 +324,3 @@ class LstmGmm(nn.Module):
         if not features.detach().sum().isfinite():
             raise ModelError("Features hold a NaN or infinite value; cut such frames out first.")
         return features
-
-
-def _normal(like: Tensor, generator: torch.Generator | None) -> Tensor:
-    """Standard normal numbers, as many as `like` has."""
-    return torch.randn(like.shape, generator=generator, device=like.device, dtype=like.dtype)

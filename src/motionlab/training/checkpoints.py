@@ -10,7 +10,7 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 import safetensors
 import safetensors.torch
@@ -21,6 +21,7 @@ from ..errors import MotionLabError, TrainingError
 from ..models import LstmGmm
 
 _KINDS = {kind.__name__: kind for kind in (LstmGmm,)}
+_STARTS = "starts."
 
 
 def write_whole(path: str | os.PathLike, write: Callable[[IO[bytes]], object]) -> None:
@@ -42,30 +43,55 @@ def write_whole(path: str | os.PathLike, write: Callable[[IO[bytes]], object]) -
         raise
 
 
-def save_weights(path: str | os.PathLike, model: nn.Module, about: dict) -> None:
+def save_weights(
+    path: str | os.PathLike,
+    model: nn.Module,
+    about: dict,
+    *,
+    starts: NamedTuple | None = None,
+    half: bool = False,
+) -> None:
     """Weights, with what is needed to build the model again, and what is worth knowing about them.
+
+    Parameters
+    ----------
+    about : fit for JSON.
+    starts : a state of the model, batched, to begin motion from.
+    half : round the parameters to half precision. Normaliser, floors and starts are small, in both
+        senses, and stay as they are.
 
     Raises
     ------
     TrainingError : the file can't be written.
     """
     header = {"kind": type(model).__name__, "config": model.config(), "about": about}
-    _save(path, model.state_dict(), header)
+    tensors = model.state_dict()
+    if half:
+        tensors |= {name: tensor.half() for name, tensor in model.named_parameters()}
+    if starts is not None:
+        tensors |= {f"{_STARTS}{key}": part.clone() for key, part in starts._asdict().items()}
+    _save(path, tensors, header)
 
 
 def load_weights(path: str | os.PathLike) -> tuple[nn.Module, dict]:
-    """The model that `save_weights` stored, on the CPU, and what was said about it.
+    """The model that `save_weights` stored, in float32 on the CPU, and what was said about it.
+
+    The model has `starts`, the state that was stored with it, or None.
 
     Raises
     ------
     TrainingError : no such file, damaged, or not weights of a model of motionlab.
     """
     tensors, header = _load(path)
+    starts = {name: tensors.pop(name) for name in list(tensors) if name.startswith(_STARTS)}
+    starts = {name.removeprefix(_STARTS): tensor for name, tensor in starts.items()}
     try:
-        model = _KINDS[header["kind"]].from_config(header["config"])
+        with torch.random.fork_rng(devices=[]):  # building a model draws its first weights
+            model = _KINDS[header["kind"]].from_config(header["config"])
         model.load_state_dict(tensors)
+        model.starts = model.zero_state()._replace(**starts) if starts else None
         return model, header["about"]
-    except (KeyError, TypeError, RuntimeError, MotionLabError) as error:
+    except (KeyError, TypeError, ValueError, RuntimeError, MotionLabError) as error:
         raise TrainingError(
             f"{path}: holds no weights of a model of motionlab ({error})."
         ) from error

@@ -89,7 +89,7 @@ _LSTM_GMM = {
     "smoke": Preset(
         updates=40, decay=10, batch=8, frames=16, validate_every=10, width=32, warmup=5
     ),
-    "table": Preset(updates=8_000, decay=1_500, batch=32, frames=64, validate_every=200, width=256),
+    "table": Preset(updates=3_000, decay=600, batch=32, frames=64, validate_every=200, width=256),
     "ship": Preset(updates=60_000, decay=3_000, batch=32, frames=64, validate_every=200),
     "paper": Preset(
         updates=60_000, decay=0, batch=20, frames=50, validate_every=1_000, optimizer="rmsprop",

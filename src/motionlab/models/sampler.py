@@ -1,0 +1,174 @@
+"""`LstmGmm.generate` unrolled for speed, for when no gradient is asked for.
+
+The same network and the same chance as the loop in lstm_gmm.py. What is different: nothing
+remembers how it was computed, features stay normalised from the first frame to the last, and each
+LSTM layer multiplies once, [input, h] by [W_input, W_h].
+
+How fast can it be? One character reads all weights for each frame: 19 MB at width 512. Hundreds
+read them once for all and wait for the multiplications. So fewer bytes help the one, smaller
+numbers the other: the two roundings in `PRECISIONS`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from ..errors import ModelError
+
+if TYPE_CHECKING:
+    from .lstm_gmm import LstmGmm, State
+
+_rounded: WeakKeyDictionary[LstmGmm, tuple[list, list]] = WeakKeyDictionary()
+Linear = Callable[[Tensor], Tensor]  # (batch, in) -> (batch, out)
+
+
+def choose(log_weights: Tensor, generator: torch.Generator | None) -> Tensor:
+    """Index (...) of one of M components, drawn by weights (..., M) that may sum to anything.
+
+    A clock for each, of exponential waiting time, that runs as fast as the component is likely: the
+    first to ring wins. That is `torch.multinomial`, without its checks and its matrices only.
+    """
+    weights = log_weights.softmax(-1)
+    waiting = torch.empty_like(weights).exponential_(generator=generator)
+    return (weights / waiting).argmax(-1)
+
+
+def normal(like: Tensor, generator: torch.Generator | None) -> Tensor:
+    """Standard normal numbers, as many as `like` has."""
+    return torch.randn(like.shape, generator=generator, device=like.device, dtype=like.dtype)
+
+
+@torch.no_grad()
+def unroll(
+    model: LstmGmm,
+    n: int,
+    start: State,
+    generator: torch.Generator | None,
+    temperature: float,
+    component_temperature: float,
+    noise: float,
+    precision: str,
+) -> Tensor:
+    """n frames (batch, n, dim) that go on from a state; see `LstmGmm.generate`."""
+    if precision != "full" and not can_round(start.hidden):
+        raise ModelError(
+            f'generate: precision "{precision}" needs a float32 model on an x86 processor. '
+            "Leave it out."
+        )
+    with torch.autocast(start.frame.device.type, enabled=False):
+        first, second, *layers, leave = _products(model, precision)
+        seen = model.normalizer(start.frame)  # (batch, kept)
+        hidden, cell = ([*part.unbind(1)] for part in (start.hidden, start.cell))
+        frames = seen.new_empty(len(seen), n, model.kept)
+        rows = torch.arange(len(seen), device=seen.device)
+        for t in range(n):
+            if t:
+                out = second(first(seen).relu_()).relu_()
+                for i, gates in enumerate(layers):
+                    out, cell[i] = _lstm(gates(torch.cat([out, hidden[i]], 1)), cell[i])
+                    hidden[i] = out
+            weights, gaussians = leave(hidden[-1]).tensor_split([model.components], 1)
+            chosen = choose(weights / component_temperature, generator)
+            gaussians = gaussians.view(len(seen), 2, model.components, model.kept)
+            mean, log_std = gaussians[rows, :, chosen].unbind(1)
+            std = temperature * (model.reach * log_std.exp() + model.floor)
+            frame = model.reach * mean + model.skip * seen + std * normal(std, generator)
+            frames[:, t] = seen = frame
+            if noise and t < n - 1:
+                disturbance = noise * normal(start.frame, generator)  # (batch, dim), as the loop's
+                seen = frame + disturbance[:, model.normalizer.kept]
+        return model.normalizer.inverse(frames)
+
+
+def _lstm(gates: Tensor, cell: Tensor) -> tuple[Tensor, Tensor]:
+    """New h and C (batch, width) of a layer from its four gates side by side (batch, 4 width).
+
+    One sigmoid does for all four, and takes a third of a tanh's time: tanh(x) = 2 sigmoid(2 x) - 1.
+    The third gate, which wants the tanh, comes doubled (`_made`).
+    """
+    enter, keep, new, show = gates.sigmoid_().chunk(4, 1)
+    cell = torch.addcmul(keep.mul_(cell), enter, new.mul_(2).sub_(1))
+    return (2 * cell).sigmoid_().mul_(2).sub_(1).mul_(show), cell
+
+
+def _products(model: LstmGmm, precision: str) -> list[Linear]:
+    """The network's five matrix products; those of the LSTM layers for all four gates at once.
+
+    Rounding takes as long as drawing some seconds of one character. So what was rounded is kept for
+    as long as the model lives and its weights do not change.
+    """
+    if precision == "full":
+        return _made(model, _full)
+    weights = [precision, *((weight.data_ptr(), weight._version) for weight in model.parameters())]
+    of_weights, products = _rounded.get(model, (None, []))
+    if of_weights != weights:
+        products = _made(model, PRECISIONS[precision])
+        _rounded[model] = weights, products
+    return products
+
+
+def _made(model: LstmGmm, linear: Callable[[Tensor, Tensor], Linear]) -> list[Linear]:
+    products = [linear(layer.weight, layer.bias) for layer in (model.enter[0], model.enter[2])]
+    for of_input, of_hidden, bias, bias_too in model.lstm.all_weights:
+        weight, bias = torch.cat([of_input, of_hidden], 1), bias + bias_too
+        for part in (weight, bias):
+            part[2 * model.width : 3 * model.width].mul_(2)  # see _lstm
+        products.append(linear(weight, bias))
+    return [*products, linear(model.leave.weight, model.leave.bias)]
+
+
+def _full(weight: Tensor, bias: Tensor) -> Linear:
+    return lambda inputs: functional.linear(inputs, weight, bias)
+
+
+def _half(weight: Tensor, bias: Tensor) -> Linear:
+    """Weights in half precision, which is half the memory to go through; sums in float32."""
+    packed = torch.ops.quantized.linear_prepack_fp16(weight, bias)
+    return lambda inputs: torch.ops.quantized.linear_dynamic_fp16(inputs, packed)
+
+
+def _int8(weight: Tensor, bias: Tensor) -> Linear:
+    """Whole numbers: each row of weights in 255 steps, the inputs in 128.
+
+    Not 256: older processors add products in pairs, in 16 bits, and 2 * 127 * 127 is what fits.
+    The step of the inputs is chosen anew each time, by the largest and the smallest in the batch.
+    """
+    low, high = weight.aminmax(dim=1)
+    scale = torch.maximum(high, -low).clamp(min=1e-12) / 127
+    whole = (weight / scale[:, None]).round_().to(torch.int8)
+    packed = torch.ops.onednn.qlinear_prepack(whole, None)
+    zeros = torch.zeros(len(scale), dtype=torch.int32)
+
+    def product(inputs: Tensor) -> Tensor:
+        low, high = (edge.item() for edge in inputs.aminmax())
+        if not math.isfinite(high - low):
+            raise ModelError(
+                "generate: a character has left all bounds, and in int8 they share their steps. "
+                'Take precision "half", or a lower temperature.'
+            )
+        step = max(high - low, 1e-6) / 127
+        zero = round(-low / step)
+        half = inputs.new_tensor(zero + 0.5)  # conversion cuts off what is behind the point
+        whole = torch.add(half, inputs, alpha=1 / step).to(torch.uint8)
+        return torch.ops.onednn.qlinear_pointwise(
+            whole, step, zero, packed, scale, zeros, bias, 1.0, 0, torch.float32, "none", [], ""
+        )
+
+    return product
+
+
+def can_round(tensor: Tensor) -> bool:
+    """Whether torch has products with rounded weights for such a tensor on this machine."""
+    engines = torch.backends.quantized.supported_engines
+    on_x86 = "fbgemm" in engines and torch.backends.mkldnn.is_available()
+    return on_x86 and tensor.device.type == "cpu" and tensor.dtype == torch.float32
+
+
+PRECISIONS = {"full": _full, "half": _half, "int8": _int8}
