@@ -18,6 +18,10 @@ READ_WHEN_IT_RUNS = {
     "motionlab/viewer/static/player.js",
     "motionlab/viewer/static/widget.js",
     "motionlab/viewer/style.mplstyle",
+} | {
+    f"motionlab/weights/{path.name}"
+    for kind in ("*.safetensors", "*.md")
+    for path in (ROOT / "src" / "motionlab" / "weights").glob(kind)
 }
 
 

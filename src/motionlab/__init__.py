@@ -18,6 +18,7 @@ __all__ = [
     "encodings",
     "forward_kinematics",
     "ik",
+    "load",
     "metrics",
     "read_bvh",
     "show",
@@ -40,4 +41,8 @@ def __getattr__(name: str):
         from .viewer import show
 
         return show
+    if name == "load":
+        from .weights import load
+
+        return load
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

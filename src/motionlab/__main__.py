@@ -12,6 +12,9 @@ from typing import Annotated, Literal
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
+from .commands.evaluate import Evaluate
+from .commands.reproduce import Reproduce
+from .commands.sample import Sample
 from .errors import MotionLabError
 
 NO_FILES = "gaits are made on the spot and have no files."
@@ -174,7 +177,7 @@ class Train:
     """How long and how large; see motionlab.training.presets."""
     data: Annotated[str, arg(metavar="NAME|FOLDER|FILE")] = "locomotion"
     """Data set, folder of BVH files, or what `prepare` wrote."""
-    start: Annotated[Path | None, arg(name="from", metavar="WEIGHTS")] = None
+    start: Annotated[str | None, arg(name="from", metavar="NAME|WEIGHTS")] = None
     """Weights to begin with, for fine-tuning."""
     out: Path | None = None
     """Folder to write to; runs/MODEL-PRESET if left out."""
@@ -193,6 +196,7 @@ class Train:
 
     def run(self) -> None:
         from .training import PRESETS, Prepared, build
+        from .weights import find
 
         try:
             from .training.loop import train
@@ -206,7 +210,7 @@ class Train:
         data = Prepared.find(self.data)
         if self.model == "lstm-gmm":
             data = data.without_contacts()
-        model = build(data, preset, self.start)
+        model = build(data, preset, self.start and find(self.start))
         out = self.out or Path("runs") / f"{self.model}-{self.preset}"
         curve = train(
             model, data, preset, out, name=self.model, accelerator=self.accelerator,
@@ -221,6 +225,9 @@ COMMANDS = (
     Annotated[Data, subcommand("data")]
     | Annotated[Prepare, subcommand("prepare")]
     | Annotated[Train, subcommand("train")]
+    | Annotated[Evaluate, subcommand("evaluate")]
+    | Annotated[Sample, subcommand("sample")]
+    | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Version, subcommand("version")]
 )
 

@@ -1,0 +1,94 @@
+"""`motionlab evaluate`: held-out likelihood, and samples beside the data."""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from ..errors import TrainingError
+from .sample import check_writable, given
+
+
+@dataclass
+class Evaluate:
+    """Held-out likelihood of a trained model, and its samples beside the data."""
+
+    model: Positional[Annotated[str, arg(metavar="NAME|WEIGHTS")]]
+    """Shipped weights, such as lstm-gmm, or a file of your own."""
+    data: Annotated[str, arg(metavar="NAME|FOLDER|FILE")] = "locomotion"
+    """Data set, folder of BVH files, or what `prepare` wrote."""
+    split: Literal["val", "test"] = "val"
+    """Clips to compare with; choose by val, report test once."""
+    starts: int = 20
+    """Number of samples, each from another moment of these clips."""
+    seconds: float = 20.0
+    """How long each is."""
+    temperature: float | None = None
+    """Factor on the standard deviations; if left out, what suits the weights."""
+    component_temperature: float | None = None
+    """The same for the choice among the Gaussians."""
+    noise: float | None = None
+    """Standard deviation of the noise on the inputs, in normalised units."""
+    seed: int = 0
+    """Start of all chance."""
+    out: Path | None = None
+    """File for the numbers, as JSON."""
+
+    def run(self) -> None:
+        from .. import __version__, load
+        from ..training import Prepared
+        from ..training.checkpoints import write_whole
+        from ..training.evaluation import evaluate
+
+        begin = time.perf_counter()
+        if self.out is not None:
+            check_writable(self.out.parent)
+        model, data = load(self.model), Prepared.find(self.data)
+        sampling = model.sampling | given(self)
+        found = evaluate(
+            model, data, self.split, starts=self.starts, seconds=self.seconds, seed=self.seed,
+            **sampling,
+        )  # fmt: skip
+        print(f"{self.model}: {found.log_likelihood} nats a frame, "
+              f"{found.log_likelihood.clips} clips of {self.split}\n")  # fmt: skip
+        print(f"{'':28} {f'{found.starts} samples':22} {self.split}")
+        for metric, real in found.data.items():
+            print(f"{metric:28} {found.samples.get(metric, 'none lasted')!s:22} {real}")
+        print(f"\nfrozen {found.frozen}, diverged {found.diverged} of {found.starts} within "
+              f"{self.seconds:g} s")  # fmt: skip
+        if self.out is None:
+            return
+        result = {
+            "command": " ".join(["motionlab", *sys.argv[1:]]),
+            "code_version": __version__,
+            "weights": model.hash,
+            "data_hash": data.hash,
+            "seed": self.seed,
+            "sampling": sampling,
+            "split": self.split,
+            "seconds_each": self.seconds,
+            **_named(asdict(found)),
+            "machine": platform.platform(),
+            "seconds": round(time.perf_counter() - begin, 1),
+        }
+        text = json.dumps(result, indent=1, ensure_ascii=False) + "\n"
+        try:
+            write_whole(self.out, lambda stream: stream.write(text.encode()))
+        except OSError as error:
+            raise TrainingError(f"{self.out}: can't be written ({error.strerror}).") from error
+
+
+def _named(found: dict) -> dict:
+    """Intervals as objects with names; JSON would make bare lists of them."""
+    return {
+        key: value._asdict() if isinstance(value, tuple)
+        else _named(value) if isinstance(value, dict) else value
+        for key, value in found.items()
+    }  # fmt: skip

@@ -1,0 +1,122 @@
+"""`motionlab sample`: motion out of shipped or own weights, as BVH."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from ..errors import MotionLabError, TrainingError
+
+LONG, MOST = 30_000, 1_000_000  # frames, of all characters: some ten seconds of work; of memory
+
+
+@dataclass
+class Sample:
+    """Motion out of a trained model, as BVH: it goes on from a start as it likes."""
+
+    model: Positional[Annotated[str, arg(metavar="NAME|WEIGHTS")]]
+    """Shipped weights, such as lstm-gmm, or a file of your own."""
+    out: Path
+    """File to write; with several characters walk.bvh becomes walk_1.bvh, walk_2.bvh, ..."""
+    seconds: float = 10.0
+    """How long."""
+    start: Annotated[str | None, arg(metavar="INDEX|NAME")] = None
+    """Start by number or by how its name begins; if left out, each character gets another one."""
+    temperature: float | None = None
+    """Factor on the standard deviations; if left out, what suits the weights."""
+    component_temperature: float | None = None
+    """The same for the choice among the Gaussians."""
+    noise: float | None = None
+    """Standard deviation of the noise on the inputs, in normalised units."""
+    seed: int = 0
+    """Start of all chance."""
+    characters: int = 1
+    """How many, each with a chance of its own."""
+
+    def run(self) -> None:
+        import torch
+
+        from .. import load, write_bvh
+
+        model = load(self.model)
+        paths, frames = self._paths(), self._frames(model.fps)
+        chosen = self._starts(model.start_names)
+        for folder in {path.parent for path in paths}:
+            check_writable(folder)
+        sampling = model.sampling | given(self)
+        if frames * len(paths) >= LONG:
+            print(f"{frames * len(paths)} frames; this takes a while", flush=True)
+        with torch.no_grad():
+            features = model.generate(
+                frames, model.starts[chosen],
+                generator=torch.Generator().manual_seed(self.seed), **sampling,
+            )  # fmt: skip
+        motions = [
+            model.encoding.to_motion(each, name=path.stem, source=self.model)
+            for each, path in zip(features, paths, strict=True)
+        ]
+        for motion, path, start in zip(motions, paths, chosen, strict=True):
+            write_bvh(motion, path)
+            print(f"{path}: {motion.seconds:.1f} s from {model.start_names[start]!r}")
+
+    def _frames(self, fps: float) -> int:
+        if not 0 < self.seconds < math.inf:
+            raise MotionLabError(f"--seconds {self.seconds}: must be a number above 0.")
+        if not (frames := round(self.seconds * fps)):
+            raise MotionLabError(
+                f"--seconds {self.seconds}: is no frame yet; one lasts {1 / fps:.3f} seconds."
+            )
+        if frames * self.characters > MOST:
+            raise MotionLabError(
+                f"--seconds {self.seconds:g}: at most {MOST / fps:.0f} seconds at once, of all "
+                "characters together; ask for several files, each with another --seed."
+            )
+        return frames
+
+    def _paths(self) -> list[Path]:
+        if not 1 <= self.characters <= 1000:
+            raise MotionLabError(f"--characters {self.characters}: must be 1 to 1000.")
+        if self.out.suffix.lower() != ".bvh":
+            raise MotionLabError(f"--out {self.out}: the name must end in .bvh.")
+        if self.characters == 1:
+            paths = [self.out]
+        else:
+            numbers = range(1, self.characters + 1)
+            paths = [self.out.with_stem(f"{self.out.stem}_{number}") for number in numbers]
+        for path in paths:
+            if path.is_dir():
+                raise MotionLabError(f"--out {path}: is a folder; name a file.")
+        return paths
+
+    def _starts(self, names: tuple[str, ...]) -> list[int]:
+        """Index of the start of each character."""
+        if self.start is None:
+            return [number % len(names) for number in range(self.characters)]
+        if self.start.isdecimal() and int(self.start) < len(names):
+            return [int(self.start)] * self.characters
+        found = [i for i, name in enumerate(names) if name.startswith(self.start)]
+        if self.start and found:
+            return [found[0]] * self.characters
+        listed = "; ".join(f"{i} {name}" for i, name in enumerate(names))
+        raise MotionLabError(f"--start {self.start}: there is none. {self.model} has {listed}.")
+
+
+def given(command: object) -> dict[str, float]:
+    """Arguments of `generate` that the command line names."""
+    keys = ("temperature", "component_temperature", "noise")
+    return {key: getattr(command, key) for key in keys if getattr(command, key) is not None}
+
+
+def check_writable(folder: Path) -> None:
+    """Before long work: raise TrainingError if no file can be made in a folder."""
+    try:
+        with tempfile.TemporaryFile(dir=os.fspath(folder)):
+            pass
+    except OSError as error:
+        raise TrainingError(f"{folder}: can't be written to ({error.strerror}).") from error

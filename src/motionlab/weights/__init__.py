@@ -1,0 +1,80 @@
+"""Trained models that ship with motionlab, each a file of weights and its card.
+
+    model = motionlab.load("lstm-gmm")
+    features = model.generate(300, model.starts[2])
+
+No data are needed. `experiments/ship_weights.py` makes the files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+from torch import nn
+
+from ..errors import ModelError
+
+_FOLDER = Path(__file__).parent
+
+
+def names() -> list[str]:
+    """Names that `load` knows."""
+    return sorted(path.stem for path in _FOLDER.glob("*.safetensors"))
+
+
+def find(name_or_path: str | os.PathLike) -> Path:
+    """The file of shipped weights, or of weights of your own; raises ModelError if there is none."""
+    if str(name_or_path) in names():
+        return _FOLDER / f"{name_or_path}.safetensors"
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    what = "is a folder" if path.is_dir() else "there is no such file"
+    raise ModelError(
+        f"Weights {str(name_or_path)!r}: {what}, and none are shipped under this name; there are "
+        f"{', '.join(names()) or 'none yet'}. "
+        "`motionlab train` leaves its own in a file best.safetensors."
+    )
+
+
+def load(name_or_path: str | os.PathLike) -> nn.Module:
+    """A trained model, ready to generate: on the CPU, in float32, in eval mode.
+
+    Parameters
+    ----------
+    name_or_path : one of `names()`, or a file such as the best.safetensors of a training.
+
+    Returns
+    -------
+    nn.Module : such as `models.LstmGmm`, and with it
+
+        * `starts`, a batch of states to begin from: ``starts[2]``, ``starts[:4]``. Weights that were
+          not shipped have a single one: that of a network which has seen the mean frame.
+        * `start_names`, what the body does in each of them, such as "walk 1.2 m/s".
+        * `sampling`, arguments of `generate` that suit these weights best.
+        * `hash`, sha256 of the file; `about`, how they were made; `card`, the same as text
+          (Markdown; that of ``x.safetensors`` is ``x.md``, empty if there is none).
+
+        Its parameters ask for no gradients, so that `generate` remembers nothing.
+
+    Raises
+    ------
+    ModelError : there are no such weights.
+    TrainingError : the file is damaged, or holds something else.
+    """
+    from ..training.checkpoints import load_weights
+
+    path = find(name_or_path)
+    model, about = load_weights(path)
+    model.eval().requires_grad_(False)
+    model.about, model.hash = about, hashlib.sha256(path.read_bytes()).hexdigest()
+    model.start_names = tuple(about.get("starts", ()))
+    model.sampling = about.get("sampling", {})
+    if model.starts is None:
+        model.starts = model.observe(model.normalizer.mean[None])
+        model.start_names = ("mean frame",)
+    card = path.with_suffix(".md")
+    model.card = card.read_text(encoding="utf-8") if card.is_file() else ""
+    return model

@@ -1,0 +1,59 @@
+"""Tiny weights, trained on gaits in a second and shipped by the script that ships the real ones."""
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+ROOT = Path(__file__).parents[2]
+
+
+def script(name):
+    """A module of experiments/."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "experiments" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def ship_weights():
+    return script("ship_weights")
+
+
+@pytest.fixture(scope="session")
+def gaits(tmp_path_factory):
+    """The data set "gaits", prepared: the data and their file."""
+    from motionlab.training import prepare
+
+    data, path = prepare("gaits"), tmp_path_factory.mktemp("data") / "gaits.npz"
+    data.save(path)
+    return SimpleNamespace(data=data, path=path)
+
+
+@pytest.fixture(scope="session")
+def trained(gaits, tmp_path_factory):
+    """Weights of a training of a second, with contacts: best.safetensors."""
+    from motionlab.training import PRESETS, build
+    from motionlab.training.loop import train
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    preset = replace(PRESETS["lstm-gmm-contacts"]["smoke"], updates=60, seed=3)
+    folder = tmp_path_factory.mktemp("trained")
+    model = build(gaits.data, preset)
+    train(model, gaits.data, preset, folder, name="lstm-gmm-contacts", accelerator="cpu")
+    torch.set_num_threads(threads)
+    return folder / "best.safetensors"
+
+
+@pytest.fixture(scope="session")
+def shipped(ship_weights, trained, gaits, tmp_path_factory):
+    """The same weights, shipped to a folder of their own: tiny.safetensors."""
+    folder = tmp_path_factory.mktemp("shipped")
+    return ship_weights.ship("tiny", trained, str(gaits.path), folder, {"temperature": 0.5})

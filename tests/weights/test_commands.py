@@ -1,0 +1,157 @@
+"""`motionlab sample`, `motionlab evaluate`, and training that begins with shipped weights."""
+
+import json
+
+import pytest
+import torch
+
+import motionlab
+from motionlab.__main__ import main
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_sample_writes_what_the_model_generates(here, shipped, capsys):
+    assert main(["sample", str(shipped), "--seconds", "2", "--out", "walk.bvh", "--seed", "4"]) == 0
+    assert "walk.bvh: 2.0 s" in capsys.readouterr().out
+    model = motionlab.load(shipped)
+    with torch.no_grad():
+        made = model.generate(
+            60, model.starts[0], temperature=0.5, generator=torch.Generator().manual_seed(4)
+        )
+    expected = model.encoding.to_motion(made[0])
+    written = motionlab.read_bvh("walk.bvh")
+    assert written.fps == pytest.approx(30, abs=0.01) and len(written) == 60
+    torch.testing.assert_close(written.positions(), expected.positions(), rtol=0, atol=1e-4)
+
+
+def test_sample_options_reach_the_model(here, shipped):
+    def sampled(*options):
+        assert main(["sample", str(shipped), "--seconds", "1", "--out", "a.bvh", *options]) == 0
+        return motionlab.read_bvh("a.bvh").positions()
+
+    usual = sampled()
+    assert torch.equal(usual, sampled())
+    for options in (["--seed", "1"], ["--temperature", "1"], ["--component-temperature", "3"],
+                    ["--noise", "0.5"], ["--start", "2"]):  # fmt: skip
+        assert not torch.equal(usual, sampled(*options)), options
+    name = motionlab.load(shipped).start_names[2]
+    assert torch.equal(sampled("--start", "2"), sampled("--start", name))
+
+
+def test_sample_of_several_characters(here, shipped, capsys):
+    main(["sample", str(shipped), "--seconds", "1", "--out", "w.bvh", "--characters", "3"])
+    assert sorted(p.name for p in here.iterdir()) == ["w_1.bvh", "w_2.bvh", "w_3.bvh"]
+    out = capsys.readouterr().out
+    assert all(repr(name) in out for name in motionlab.load(shipped).start_names[:3])
+    main(["sample", str(shipped), "--seconds", "1", "--out", "w.bvh", "--characters", "3",
+          "--start", "0"])  # fmt: skip
+    first, second, _ = (motionlab.read_bvh(f"w_{i}.bvh").positions() for i in (1, 2, 3))
+    assert not torch.equal(first, second)  # one start, another chance each
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--seconds", "0"], "above 0"),
+        (["--seconds", "-3"], "above 0"),
+        (["--seconds", "nan"], "above 0"),
+        (["--seconds", "0.01"], "no frame"),
+        (["--seconds", "1e300"], "at most"),
+        (["--seconds", "inf"], "above 0"),
+        (["--characters", "0"], "1 to 1000"),
+        (["--temperature", "0"], "temperature is 0.0"),
+        (["--component-temperature", "-1"], "component_temperature"),
+        (["--temperature", "1e30"], "NaN or infinite"),
+        (["--noise", "nan"], "noise is nan"),
+        (["--start", "99"], "there is none"),
+        (["--start", ""], "there is none"),
+        (["--start", "hop"], "0 "),
+        (["--out", "none/w.bvh"], "none: can't be written to"),
+        (["--out", "w.fbx"], "must end in .bvh"),
+    ],
+    ids=" ".join,
+)
+def test_sample_refuses_and_writes_nothing(here, shipped, capsys, options, said):
+    arguments = ["--seconds", "1", "--out", "w.bvh"]
+    assert main(["sample", str(shipped), *arguments, *options]) == 1
+    printed = capsys.readouterr().err
+    assert said in printed and "Traceback" not in printed
+    assert not list(here.iterdir())
+
+
+def test_sample_looks_at_the_output_first(here, shipped, monkeypatch, capsys):
+    def never(*arguments, **options):
+        raise AssertionError("sampled first")
+
+    monkeypatch.setattr(motionlab.models.LstmGmm, "generate", never)
+    (here / "w.bvh").mkdir()
+    assert main(["sample", str(shipped), "--out", "w.bvh"]) == 1
+    assert main(["sample", str(shipped), "--out", "none/w.bvh"]) == 1
+    assert "is a folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "command", [["sample", "--out", "w.bvh"], ["evaluate"]], ids=lambda c: c[0]
+)
+def test_weights_that_are_not_there(here, capsys, command):
+    name, *rest = command
+    assert main([name, "walker", *rest]) == 1
+    assert "Weights 'walker'" in capsys.readouterr().err
+    (here / "other.safetensors").write_bytes(b"not weights")
+    assert main([name, "other.safetensors", *rest]) == 1
+    assert "damaged" in capsys.readouterr().err
+
+
+QUICK = ["--starts", "3", "--seconds", "2"]
+
+
+def test_evaluate_prints_and_writes(here, shipped, gaits, capsys):
+    command = ["evaluate", str(shipped), "--data", str(gaits.path), *QUICK, "--out", "e.json"]
+    assert main(command) == 0
+    out = capsys.readouterr().out
+    assert "nats a frame" in out and "speed (m/s)" in out and "frozen" in out
+    found = json.loads((here / "e.json").read_text())
+    model = motionlab.load(shipped)
+    assert found["weights"] == model.hash and found["data_hash"] == gaits.data.hash
+    assert found["sampling"] == {"temperature": 0.5} and found["starts"] == 3
+    assert found["log_likelihood"]["value"] == pytest.approx(
+        model.about["log_likelihood"]["half"]["value"]
+    )
+    assert found["data"]["jerk (m/s³)"]["low"] > 0
+    assert main([*command[:-1], "none/e.json"]) == 1
+    assert "can't be written to" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--starts", "0"], "1 or more"),
+        (["--seconds", "nan"], "1 or more"),
+        (["--seconds", "1e12"], "no more"),
+        (["--temperature", "0"], "temperature"),
+        (["--data", "none.npz"], "no such file"),
+    ],
+    ids=" ".join,
+)
+def test_evaluate_refuses(here, shipped, gaits, capsys, options, said):
+    arguments = ["--data", str(gaits.path), *QUICK, "--out", "e.json", *options]
+    assert main(["evaluate", str(shipped), *arguments]) == 1
+    assert said in capsys.readouterr().err
+    assert not list(here.iterdir())
+
+
+def test_training_begins_with_a_shipped_name(here, shipped, gaits, monkeypatch):
+    monkeypatch.setattr(motionlab.weights, "_FOLDER", shipped.parent)
+    command = ["train", "lstm-gmm-contacts", "--preset", "smoke", "--data", str(gaits.path),
+               "--accelerator", "cpu", "--updates", "1", "--from", "tiny", "--out", "tuned",
+               "--learning-rate", "1e-12"]  # fmt: skip
+    assert main(command) == 0
+    tuned, tiny = (motionlab.load(x) for x in ("tuned/best.safetensors", "tiny"))
+    for mine, its in zip(tuned.parameters(), tiny.parameters(), strict=True):
+        torch.testing.assert_close(mine, its)

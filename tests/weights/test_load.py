@@ -1,0 +1,195 @@
+"""`motionlab.load`: shipped weights and one's own, and what is not weights."""
+
+import copy
+import json
+import shutil
+
+import pytest
+import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
+
+import motionlab
+from motionlab import weights
+from motionlab.errors import ModelError, TrainingError
+from motionlab.models import LstmGmm
+from motionlab.training.checkpoints import load_weights, save_weights
+
+
+@pytest.fixture(scope="module")
+def model(shipped):
+    return motionlab.load(shipped)
+
+
+def test_shipped_weights_are_ready_to_generate(model):
+    assert isinstance(model, LstmGmm) and not model.training
+    assert all(p.dtype == torch.float32 and not p.requires_grad for p in model.parameters())
+    assert model.fps == 30 and "contacts" in model.encoding.slices
+    count = len(model.start_names)
+    assert count == len(set(model.start_names)) == len(model.starts.frame) > 3
+    made = model.generate(40, model.starts[1:3], **model.sampling)
+    assert made.shape == (2, 40, model.encoding.dim) and not made.requires_grad
+    assert len(model.encoding.to_motion(made[0])) == 40
+    assert model.sampling == {"temperature": 0.5}
+
+
+def test_starts_are_states_that_the_rounded_network_reaches(model, ship_weights, gaits):
+    found = ship_weights.choose(ship_weights.candidates(gaits.data))
+    assert tuple(start.name for start in found) == model.start_names
+    clips = gaits.data.clips("val")
+    for index, start in enumerate(found):
+        seen = model.observe(clips[start.clip][start.frame - 30 : start.frame])
+        for part, its in zip(seen, model.starts[index], strict=True):
+            torch.testing.assert_close(part, its, rtol=1e-4, atol=1e-5)
+
+
+def test_parameters_are_rounded_and_nothing_else(shipped, trained, model):
+    with safe_open(shipped, framework="pt") as file:
+        kinds = {name: file.get_tensor(name).dtype for name in file.keys()}  # noqa: SIM118
+    parameters = dict(model.named_parameters())
+    assert {name for name, kind in kinds.items() if kind == torch.float16} == parameters.keys()
+    assert kinds["normalizer.kept"] == torch.int64 and kinds["normalizer.std"] == torch.float32
+    full = load_weights(trained)[0].state_dict()
+    for name, tensor in model.state_dict().items():
+        rounded = full[name].half().float() if name in parameters else full[name]
+        assert torch.equal(tensor, rounded), name
+
+
+def test_a_file_of_a_training_starts_from_the_mean_frame(trained):
+    model = motionlab.load(trained)
+    assert model.start_names == ("mean frame",) and model.card == "" and model.sampling == {}
+    expected = model.observe(model.normalizer.mean[None])
+    for part, its in zip(model.starts, expected, strict=True):
+        assert torch.equal(part, its)
+    assert model.generate(3, model.starts).shape == (1, 3, model.encoding.dim)
+    assert model.about["name"] == "lstm-gmm-contacts"
+
+
+def test_names_are_found_before_files(shipped, monkeypatch, tmp_path):
+    monkeypatch.setattr(weights, "_FOLDER", shipped.parent)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tiny").write_text("in the way")
+    assert weights.names() == ["tiny"]
+    assert motionlab.load("tiny").start_names == motionlab.load(shipped).start_names
+    with pytest.raises(ModelError, match="Weights 'small': there is no such file.*there are tiny"):
+        motionlab.load("small")
+
+
+def test_loading_leaves_chance_alone(shipped):
+    torch.manual_seed(5)
+    before = torch.get_rng_state()
+    motionlab.load(shipped)
+    assert torch.equal(torch.get_rng_state(), before)
+
+
+@pytest.mark.parametrize("kept", [0, 7, 300, -1000])
+def test_damaged_files(shipped, tmp_path, kept):
+    path = tmp_path / "cut.safetensors"
+    path.write_bytes(shipped.read_bytes()[:kept])
+    with pytest.raises(TrainingError, match="cut.safetensors: is damaged"):
+        motionlab.load(path)
+
+
+def foreign(path, header):
+    save_file(
+        {"a": torch.zeros(3)}, path, None if header is None else {"motionlab": json.dumps(header)}
+    )
+
+
+@pytest.mark.parametrize(
+    "header",
+    [None, {}, [], {"kind": "Transformer", "config": {}}, {"kind": "LstmGmm", "config": {}}],
+    ids=["no header", "empty", "list", "other kind", "no config"],
+)
+def test_foreign_files(tmp_path, header):
+    foreign(tmp_path / "other.safetensors", header)
+    with pytest.raises(TrainingError, match="other.safetensors: "):
+        motionlab.load(tmp_path / "other.safetensors")
+
+
+def test_weights_and_header_of_different_models(trained, tmp_path):
+    model, about = load_weights(trained)
+    wider = copy.copy(model)
+    wider.config = lambda: {**model.config(), "width": 33}
+    wider.__class__ = type("LstmGmm", (LstmGmm,), {})
+    save_weights(tmp_path / "mixed.safetensors", wider, about)
+    with pytest.raises(TrainingError, match="holds no weights"):
+        motionlab.load(tmp_path / "mixed.safetensors")
+    starts = model.zero_state()
+    save_weights(tmp_path / "good.safetensors", model, about, starts=starts)
+    assert torch.equal(load_weights(tmp_path / "good.safetensors")[0].starts.frame, starts.frame)
+
+
+def test_a_folder_is_no_file(tmp_path):
+    with pytest.raises(ModelError, match="is a folder"):
+        motionlab.load(tmp_path)
+
+
+def test_shipped_weights_can_be_trained_further(shipped, gaits):
+    from motionlab.training import PRESETS, build
+
+    model = build(gaits.data, PRESETS["lstm-gmm-contacts"]["smoke"], shipped)
+    assert all(parameter.requires_grad for parameter in model.parameters())
+
+
+# -- the card, and what is really shipped ---------------------------------------------------------
+
+
+def test_card_says_what_the_file_holds(model, shipped, ship_weights, gaits):
+    about = model.about
+    assert about["command"].startswith("motionlab train lstm-gmm-contacts --preset smoke --data")
+    assert about["command"].endswith("--updates 60 --seed 3")
+    half, full = (about["log_likelihood"][kind]["value"] for kind in ("half", "full"))
+    assert abs(half - full) < 0.1 and half != full
+    for said in (
+        about["command"], gaits.data.hash, f"{half:.3f} nats", f"{shipped.stat().st_size / 2**20:.1f} MiB",
+        "| seed | 3 |", "temperature 0.5", *model.start_names, "allow commercial use", "MIT",
+    ):  # fmt: skip
+        assert said in model.card, said
+    assert (
+        model.hash in motionlab.load(shutil.copy(shipped, shipped.with_name("b.safetensors"))).hash
+    )
+
+
+def test_other_data_than_those_of_the_training_are_refused(ship_weights, trained, gaits, tmp_path):
+    from motionlab.training import prepared
+
+    data = gaits.data
+    fewer = tuple("test" if i == 0 else split for i, split in enumerate(data.splits))
+    digest = prepared._digest(prepared._arrays(
+        data.features, data.lengths, data.names, fewer, data.normalizer, data.encoding
+    ))  # fmt: skip
+    type(data)(data.features, data.lengths, data.names, fewer, data.encoding, data.normalizer,
+               digest).save(tmp_path / "fewer.npz")  # fmt: skip
+    with pytest.raises(motionlab.MotionLabError, match="was not trained on"):
+        ship_weights.ship("x", trained, str(tmp_path / "fewer.npz"), tmp_path / "out", {})
+    assert not (tmp_path / "out").exists()
+
+
+def test_starts_are_named_after_what_follows(ship_weights, gaits):
+    names = [name for name, split in zip(gaits.data.names, gaits.data.splits, strict=True)
+             if split == "val"]  # fmt: skip
+    found = ship_weights.candidates(gaits.data)
+    assert {start.clip for start in found} == set(range(len(names)))
+    for start in found:
+        gait = names[start.clip].split("/")[1].split("_")[0]
+        # who goes and halts walks or stands
+        assert start.gait == gait or (gait == "go" and start.gait in ("walk", "stand")), start
+
+
+@pytest.mark.parametrize("name", weights.names())
+def test_what_is_shipped(name):
+    model = motionlab.load(name)
+    assert weights.find(name).stat().st_size < 10 * 2**20
+    assert model.about["name"] == name and model.card.startswith(f"# {name}\n")
+    assert 4 <= len(model.starts.frame) == len(model.start_names)
+    made = model.generate(
+        60, model.starts, generator=torch.Generator().manual_seed(0), **model.sampling
+    )
+    heights = model.encoding.positions(made)[..., 0, 1]
+    assert 0.4 < heights.min() and heights.max() < 1.4
+
+
+def test_all_that_is_shipped_fits_the_budget():
+    sizes = [weights.find(name).stat().st_size for name in weights.names()]
+    assert sum(sizes) <= 34 * 2**20
