@@ -1,0 +1,320 @@
+"""Verdicts of the claims in claims.yaml, computed from results/ by the rules written there.
+
+    python experiments/verdicts.py [ID ...]
+
+One function a claim: it takes the claim's limits and its results, and returns the verdict and the
+numbers that decided it. A result that is not there gives "open".
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
+UNTESTABLE, OPEN = "not testable here", "open"
+VERDICTS = (REPRODUCED, PARTLY, NOT, UNTESTABLE, OPEN)
+
+
+class Verdict(NamedTuple):
+    """One of VERDICTS, the numbers behind it, and what must be said with it."""
+
+    verdict: str
+    numbers: dict[str, float | str]
+    remark: str = ""
+
+
+class Absent(Exception):
+    """What a verdict needs has not been measured yet."""
+
+
+def claims() -> list[dict]:
+    """Claims in the order of the file."""
+    text = (ROOT / "experiments" / "claims.yaml").read_text(encoding="utf-8")
+    return yaml.safe_load(text)["claims"]
+
+
+def rule_of(claim: dict) -> str:
+    """The rule with its limits filled in."""
+    return claim["rule"].format(**claim["limits"]) if "rule" in claim else ""
+
+
+def results_of(claim: dict) -> list[str]:
+    """Files of results/ that settle a claim, without .json."""
+    names = claim.get("result", [])
+    return [names] if isinstance(names, str) else names
+
+
+def judge(claim: dict, results: Path = ROOT / "results") -> Verdict:
+    """The verdict on a claim."""
+    if "rule" not in claim:
+        return Verdict(OPEN, {}, "its rule is to be written before its run")
+    found = []
+    for name in results_of(claim):
+        path = results / f"{name}.json"
+        if not path.exists():
+            return Verdict(OPEN, {}, f"no results/{name}.json yet")
+        found.append(json.loads(path.read_text(encoding="utf-8")))
+    try:
+        return RULES[claim["id"]](claim["limits"], *found)
+    except Absent as absent:
+        return Verdict(OPEN, {}, str(absent))
+
+
+# -- W1 -------------------------------------------------------------------------------------------
+
+
+def w1_variety(limits: dict, samples: dict) -> Verdict:
+    numbers, ratios = {}, []
+    for gait, found in samples["variety"].items():
+        for quantity, spreads in found["quantities"].items():
+            ratio = spreads["samples"]["spread"] / spreads["the same again"]["spread"]
+            numbers[f"{gait}, spread of {quantity.split(' (')[0]} over people's"] = ratio
+            ratios.append(ratio)
+        numbers[f"{gait}, sound samples"] = found["sound"]
+    enough = sum(ratio >= limits["spread"] for ratio in ratios)
+    verdict = REPRODUCED if enough == len(ratios) else PARTLY if enough >= limits["some"] else NOT
+    sound = all(found["sound"] >= limits["inside"] for found in samples["variety"].values())
+    if verdict == REPRODUCED and not sound:
+        return Verdict(PARTLY, numbers, "too few of the samples are sound")
+    return Verdict(verdict, numbers)
+
+
+def w1_endless(limits: dict, samples: dict) -> Verdict:
+    found = samples["endless"]
+    low, high = found["alive, 95 %"]
+    numbers = {
+        "rollouts": found["rollouts"], "seconds each": found["seconds each"],
+        "alive at the end": found["alive"], "alive, 95 % interval": f"{low:.3g} to {high:.3g}",
+        **{f"{kind} rollouts": count for kind, count in found["failed"].items()},
+    }  # fmt: skip
+    if found["rollouts"] < 100 or found["seconds each"] < 600:
+        raise Absent("the result there is of fewer or shorter rollouts than the rule asks for")
+    if found["alive"] < limits["half"]:
+        return Verdict(NOT, numbers)
+    drift = found["last minute's speed over the first's"]
+    few = ("in a loop", "same end as another", "standing about")
+    numbers |= {"last minute's speed over the first's": drift, **{key: found[key] for key in few}}
+    good = (
+        found["alive"] >= limits["alive"]
+        and abs(drift - 1) <= limits["drift"]
+        and all(found[key] <= limits["few"] for key in few)
+    )
+    return Verdict(REPRODUCED if good else PARTLY, numbers)
+
+
+def w1_likeness(limits: dict, samples: dict) -> Verdict:
+    found = samples["likeness"]
+    failed = found["failed in the first minute"]
+    numbers = {"failed in the first minute": failed}
+    if "samples over data" not in found:
+        return Verdict(NOT, numbers)
+    ratios = found["samples over data"]
+    numbers |= {f"{key.split(' (')[0]} over the data's": ratio for key, ratio in ratios.items()}
+    if failed > limits["failed"]:
+        return Verdict(NOT, numbers)
+    close = [
+        abs(ratios["acceleration (m/s²)"] - 1) <= limits["acceleration"],
+        abs(ratios["speed (m/s)"] - 1) <= limits["speed"],
+    ]
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(close)], numbers)
+
+
+def w1_novelty(limits: dict, samples: dict) -> Verdict:
+    found = samples["novelty"]
+    if not found:
+        return Verdict(NOT, {}, "no rollout lasted a minute")
+    far = found["median over that of held-out clips"]
+    numbers = {"replays": found["replays"], "median distance over held-out clips'": far}
+    good = [found["replays"] <= limits["replay"], far <= limits["far"]]
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+
+
+# -- W2 -------------------------------------------------------------------------------------------
+
+BETTER, LEANING, SAME, WORSE = "better", "leaning", "no different", "worse"
+
+
+def compare(claimed: Sequence[float], other: Sequence[float], least: float) -> str:
+    """How seeds of two rows differ, higher being better: see the rules of W2."""
+    difference = sum(claimed) / len(claimed) - sum(other) / len(other)
+    if abs(difference) < least:
+        return SAME
+    if difference < 0:
+        return WORSE
+    return BETTER if min(claimed) > max(other) else LEANING
+
+
+def liveliness(ratio: float | None) -> float:
+    """How far from the data's acceleration, as a negative number: higher is better."""
+    return -abs(math.log(ratio)) if ratio else -math.inf
+
+
+def seeds(recipe: dict, row: str) -> list[dict]:
+    """The runs of a row; raises Absent if there are fewer than three."""
+    runs = recipe["rows"].get(row, {}).get("runs", [])
+    if len(runs) < 3:
+        raise Absent(f"row {row!r} has {len(runs)} of 3 seeds")
+    return runs
+
+
+def _robustness(limits: dict, recipe: dict, claimed: str, other: str) -> Verdict:
+    measures = {
+        "seconds until failure": (lambda run: run["seconds until failure"], limits["seconds"]),
+        "liveliness": (
+            lambda run: liveliness(run["acceleration over data"]), limits["liveliness"]
+        ),
+    }  # fmt: skip
+    return _rows(recipe, claimed, other, measures, _better_and_not_worse)
+
+
+def _rows(
+    recipe: dict, claimed: str, other: str, measures: dict, rule: Callable[[dict], str]
+) -> Verdict:
+    numbers, outcomes = {}, {}
+    for measure, (of, least) in measures.items():
+        values = {row: [of(run) for run in seeds(recipe, row)] for row in (claimed, other)}
+        outcomes[measure] = compare(values[claimed], values[other], least)
+        for row, found in values.items():
+            numbers[f"{measure}, {row}"] = ", ".join(f"{value:.3g}" for value in found)
+        numbers[measure] = outcomes[measure]
+    return Verdict(rule(outcomes), numbers)
+
+
+def _better_and_not_worse(outcomes: dict[str, str]) -> str:
+    found = set(outcomes.values())
+    if BETTER in found and WORSE not in found:
+        return REPRODUCED
+    return PARTLY if found & {BETTER, LEANING} else NOT
+
+
+def w2_noise(limits: dict, recipe: dict) -> Verdict:
+    return _robustness(limits, recipe, "table", "no noise")
+
+
+def w2_rate(limits: dict, recipe: dict) -> Verdict:
+    found = _robustness(limits, recipe, "30 fps", "120 fps")
+    verdict = PARTLY if found.verdict == REPRODUCED else found.verdict
+    minutes = recipe["rows"]["30 fps"]["minutes"]
+    return Verdict(verdict, found.numbers | {"minutes of training clips": minutes}, "underpowered")
+
+
+def w2_optimiser(limits: dict, recipe: dict) -> Verdict:
+    measures = {"nats a frame": (lambda run: run["log-likelihood"], limits["nats"])}
+    verdict, numbers, _ = _rows(recipe, "RMSProp", "SGD", measures, _only)
+    edges = []
+    for row in ("RMSProp", "SGD"):
+        tried = recipe["rows"][row]["learning rates"]  # rate as text: validation loss
+        best = min(tried, key=lambda rate: math.inf if tried[rate] is None else tried[rate])
+        numbers[f"learning rate of {row}"] = best
+        order = sorted(tried, key=float)
+        if best in (order[0], order[-1]):
+            edges.append(f"the best learning rate of {row} is at the edge of those tried")
+    return Verdict(verdict, numbers, "; ".join(edges))
+
+
+def _only(outcomes: dict[str, str]) -> str:
+    (outcome,) = outcomes.values()
+    return {BETTER: REPRODUCED, LEANING: PARTLY}.get(outcome, NOT)
+
+
+def w2_pretraining(limits: dict, recipe: dict) -> Verdict:
+    measures = {
+        "nats a frame": (lambda run: run["log-likelihood"], limits["nats"]),
+        "liveliness": (
+            lambda run: liveliness(run["acceleration over data"]), limits["liveliness"]
+        ),
+    }  # fmt: skip
+    return _rows(recipe, "pretrained", "scratch", measures, _fit_and_not_worse)
+
+
+def _fit_and_not_worse(outcomes: dict[str, str]) -> str:
+    if outcomes["nats a frame"] == BETTER and outcomes["liveliness"] != WORSE:
+        return REPRODUCED
+    return PARTLY if set(outcomes.values()) & {BETTER, LEANING} else NOT
+
+
+# -- W4, W8, W10 ----------------------------------------------------------------------------------
+
+
+def w4_generator(limits: dict, fit: dict, plain: dict, contact: dict) -> Verdict:
+    gain = fit["contacts minus plain"]["own contacts"]
+    skates = [
+        samples["likeness"].get("samples", {}).get("foot skate (cm/s)")
+        for samples in (plain, contact)
+    ]
+    if None in skates:
+        return Verdict(NOT, {}, "no rollout of one of both lasted a minute")
+    ratio = skates[1]["value"] / skates[0]["value"]
+    numbers = {
+        "gain (nats a frame)": gain["value"],
+        "gain, 95 % interval": f"{gain['low']:.3g} to {gain['high']:.3g}",
+        "gain with labels that look ahead": fit["contacts minus plain"]["labels"]["value"],
+        "foot skate over the plain one's": ratio,
+    }
+    good = [gain["low"] > 0, ratio <= 1 - limits["skate"]]
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+
+
+def w8(limits: dict, found: dict) -> Verdict:
+    hop = found["hop (m/s²)"]  # at the last recorded frame, and at the next
+    zero, estimated = (hop[state][0] / hop["observed"][0] for state in ("zero", "estimated"))
+    after = hop["estimated"][1] / hop["observed"][1]
+    numbers = {
+        "hop of the zero state over the warm one's": zero,
+        "hop of the estimated state over the warm one's": estimated,
+        "the same a frame later": after,
+    }
+    if zero < limits["hop"]:
+        return Verdict(UNTESTABLE, numbers, "there is no hop to remove")
+    if max(estimated, after) <= limits["smooth"]:
+        return Verdict(REPRODUCED, numbers)
+    gone = (zero - estimated) / (zero - 1)
+    return Verdict(PARTLY if gone >= limits["part"] else NOT, numbers | {"gone": gone})
+
+
+def w10(limits: dict, found: dict) -> Verdict:
+    model, data = found["weights (bytes)"]["half"], found["data (bytes)"]
+    numbers = {f"weights over data as {form}": model / size for form, size in data.items()}
+    if all(model < size for size in data.values()):
+        return Verdict(REPRODUCED, numbers)
+    return Verdict(PARTLY if model < data["BVH files"] else NOT, numbers)
+
+
+RULES = {
+    "W1-variety": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
+    "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
+    "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W4-generator": w4_generator,
+    "W8": w8, "W10": w10,
+}  # fmt: skip
+
+
+def main(wanted: Sequence[str]) -> None:
+    for claim in claims():
+        if wanted and not any(matches(claim["id"], name) for name in wanted):
+            continue
+        found = judge(claim)
+        if found.verdict == OPEN and not wanted:
+            print(f"{claim['id']:16} {OPEN}: {found.remark}")
+            continue
+        print(f"\n{claim['id']}: {found.verdict.upper()}. {claim['claim']}")
+        if found.remark:
+            print(f"  {found.remark}")
+        for what, value in found.numbers.items():
+            print(f"  {what}: {value if isinstance(value, str) else f'{value:.3g}'}")
+
+
+def matches(identity: str, name: str) -> bool:
+    """W1 names W1-variety too."""
+    return identity == name or identity.startswith(f"{name}-")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,359 @@
+"""The claim ledger: complete, its verdicts computed by rules that can go either way."""
+
+import json
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from motionlab import MotionLabError
+from motionlab.commands.reproduce import Reproduce, needed
+
+ROOT = Path(__file__).parents[1]
+BOOK = yaml.safe_load((ROOT / "experiments" / "claims.yaml").read_text(encoding="utf-8"))
+CLAIMS, STEPS = BOOK["claims"], BOOK["steps"]
+RULED = [claim["id"] for claim in CLAIMS if "rule" in claim]
+
+
+@pytest.fixture(scope="module")
+def verdicts():
+    sys.path.insert(0, str(ROOT / "experiments"))
+    try:
+        import verdicts
+    finally:
+        sys.path.pop(0)
+    return verdicts
+
+
+def claim_of(identity):
+    return next(claim for claim in CLAIMS if claim["id"] == identity)
+
+
+# -- the files ------------------------------------------------------------------------------------
+
+
+def test_every_claim_of_the_papers_has_a_row():
+    names = {claim["id"].split("-")[0] for claim in CLAIMS}
+    assert names == {f"{letter}{i}" for letter, n in zip("WZS", (11, 8, 10), strict=True)
+                     for i in range(1, n + 1)}  # fmt: skip
+    assert len({claim["id"] for claim in CLAIMS}) == len(CLAIMS)
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim["id"])
+def test_claim_is_whole_and_its_verdict_is_not_typed(claim, verdicts):
+    always = {"id", "paper", "claim", "words", "value"}
+    ruled = {"ours", "rule", "because", "limits", "result", "chapter"}
+    assert set(claim) == (always | ruled if "rule" in claim else always)
+    assert all(claim.values()) or claim["limits"] == {}
+    named = set(re.findall(r"{(\w+)", claim.get("rule", "")))
+    if claim["id"] != "W2-rate":  # whose rule is another's
+        assert named == set(claim.get("limits", {})), "limits that the rule does not tell"
+    assert "{" not in verdicts.rule_of(claim)
+
+
+def test_every_rule_has_its_function_and_its_step(verdicts):
+    assert set(verdicts.RULES) == set(RULED)
+    made = {step["makes"] for step in STEPS}
+    for identity in RULED:
+        for result in verdicts.results_of(claim_of(identity)):
+            assert f"results/{result}.json" in made
+
+
+def test_steps_stand_behind_what_they_need_and_run_scripts_that_exist():
+    made = set()
+    for step in STEPS:
+        assert set(step) <= {"makes", "needs", "command", "hours", "resumes", "trains"}
+        assert made.issuperset(step.get("needs", [])), step["makes"]
+        made.add(step["makes"])
+        program, *rest = shlex.split(step["command"])
+        assert program in ("python", "motionlab")
+        if program == "python":
+            assert (ROOT / rest[0]).is_file()
+
+
+def test_chapters_link_to_claims_that_exist():
+    known = {claim["id"].lower() for claim in CLAIMS}
+    for path in [*(ROOT / "notebooks").glob("*.ipynb"), *(ROOT / "book").glob("*.md")]:
+        linked = re.findall(r"claims(?:\.md|\.html)#([\w-]+)", path.read_text(encoding="utf-8"))
+        assert known.issuperset(linked), path.name
+
+
+# -- verdicts -------------------------------------------------------------------------------------
+
+
+def spread(value):
+    return {"spread": value}
+
+
+def variety(ratios, sound=1.0):
+    values = iter(ratios)
+    return {"variety": {
+        gait: {"sound": sound, "quantities": {
+            quantity: {"samples": spread(2 * next(values)), "the same again": spread(2.0)}
+            for quantity in ("speed (m/s)", "turn rate (rad/s)", "step length (m)")}}
+        for gait in ("walk", "run")}}  # fmt: skip
+
+
+def endless(alive=1.0, drift=1.0, loops=0.0, rollouts=100, seconds=600.0):
+    found = {"rollouts": rollouts, "seconds each": seconds, "alive": alive,
+             "alive, 95 %": [0.0, 1.0], "failed": {"frozen": 0},
+             "last minute's speed over the first's": drift, "in a loop": loops,
+             "same end as another": 0.0, "standing about": 0.0}  # fmt: skip
+    return {"endless": found}
+
+
+def likeness(acceleration=1.0, speed=1.0, failed=0.0, skate=2.0):
+    ratios = {"acceleration (m/s²)": acceleration, "speed (m/s)": speed}
+    return {"likeness": {"failed in the first minute": failed, "samples over data": ratios,
+                         "samples": {"foot skate (cm/s)": {"value": skate}}}}  # fmt: skip
+
+
+def novelty(replays, far):
+    return {"novelty": {"replays": replays, "median over that of held-out clips": far}}
+
+
+def recipe(**rows):
+    """Rows of (measure of seed 1, 2, 3) for each measure."""
+    made = {}
+    for name, (lasted, lively, nats) in rows.items():
+        made[name.replace("_", " ")] = {"minutes": 5.0, "runs": [
+            {"seconds until failure": s, "acceleration over data": a, "log-likelihood": n}
+            for s, a, n in zip(lasted, lively, nats, strict=True)]}  # fmt: skip
+    return {"rows": made}
+
+
+def noise(claimed, other):
+    return recipe(table=(*claimed, (0, 0, 0)), no_noise=(*other, (0, 0, 0)))
+
+
+def rates(lasted):
+    row = recipe(a=((60, 59, 60), (1, 1, 1), (0, 0, 0)), b=(lasted, (1, 1, 1), (0, 0, 0)))["rows"]
+    return {"rows": {"30 fps": row["a"], "120 fps": row["b"]}}
+
+
+def optimisers(ours, theirs, best="0.001"):
+    made = recipe(RMSProp=((0,) * 3, (1,) * 3, ours), SGD=((0,) * 3, (1,) * 3, theirs))
+    tried = {"0.0003": 5.0, "0.001": 5.0, "0.003": 5.0} | {best: -5.0}
+    for row in made["rows"].values():
+        row["learning rates"] = tried
+    return made
+
+
+def actors(nats, lively):
+    return recipe(pretrained=((0,) * 3, lively, nats), scratch=((0,) * 3, (1.2,) * 3, (1, 2, 3)))
+
+
+def fit(low, high):
+    gain = {"value": (low + high) / 2, "low": low, "high": high}
+    return {"contacts minus plain": {"own contacts": gain, "labels": gain}}
+
+
+def hops(zero, estimated, after):
+    hop = {"zero": [zero, 1.0], "estimated": [estimated, after], "observed": [1.0, 1.0]}
+    return {"hop (m/s²)": hop}
+
+
+def sizes(*data):
+    forms = ("BVH files", "float32 features", "8 bit features, compressed")
+    return {"weights (bytes)": {"half": 10}, "data (bytes)": dict(zip(forms, data, strict=True))}
+
+
+STEADY, LIVELY = (50, 51, 52), (1.2, 1.2, 1.2)
+CASES = [
+    ("W1-variety", "reproduced", variety([1.0] * 6)),
+    ("W1-variety", "partly", variety([2.0] * 6, sound=0.8)),
+    ("W1-variety", "partly", variety([1.2] * 3 + [0.9] * 3)),
+    ("W1-variety", "not", variety([9.0] * 2 + [0.9] * 4)),
+    ("W1-endless", "reproduced", endless(0.95, 0.86)),
+    ("W1-endless", "partly", endless(0.94)),
+    ("W1-endless", "partly", endless(drift=0.84)),
+    ("W1-endless", "partly", endless(loops=0.06)),
+    ("W1-endless", "not", endless(0.49)),
+    ("W1-endless", "open", endless(rollouts=8)),
+    ("W1-endless", "open", endless(seconds=60.0)),
+    ("W1-likeness", "reproduced", likeness(1.14, 0.91)),
+    ("W1-likeness", "partly", likeness(1.16, 0.91)),
+    ("W1-likeness", "not", likeness(1.16, 0.89)),
+    ("W1-likeness", "not", likeness(failed=0.06)),
+    ("W1-novelty", "reproduced", novelty(0.05, 1.5)),
+    ("W1-novelty", "partly", novelty(0.9, 1.0)),
+    ("W1-novelty", "partly", novelty(0.0, 2.0)),
+    ("W1-novelty", "not", novelty(0.9, 2.0)),
+    ("W2-noise", "reproduced", noise(((60, 60, 60), LIVELY), (STEADY, LIVELY))),
+    ("W2-noise", "reproduced", noise((STEADY, (1.1, 0.95, 1.1)), (STEADY, LIVELY))),
+    ("W2-noise", "partly", noise(((60, 60, 51.5), LIVELY), (STEADY, LIVELY))),
+    ("W2-noise", "partly", noise(((60, 60, 60), (1.5, 1.5, 1.5)), (STEADY, LIVELY))),
+    ("W2-noise", "not", noise((STEADY, LIVELY), (STEADY, LIVELY))),
+    ("W2-noise", "not", noise((STEADY, LIVELY), ((60, 60, 60), LIVELY))),
+    ("W2-noise", "open", recipe(table=(STEADY, LIVELY, (0, 0, 0)))),
+    ("W2-rate", "partly", rates((10, 10, 10))),
+    ("W2-rate", "not", rates((60, 60, 60))),
+    ("W2-optimiser", "reproduced", optimisers((50, 51, 52), (40, 45, 49))),
+    ("W2-optimiser", "partly", optimisers((50, 51, 52), (40, 45, 50.5))),
+    ("W2-optimiser", "not", optimisers((50, 51, 52), (49.5, 50.5, 51.5))),
+    ("W2-pretraining", "reproduced", actors((5, 5, 5), LIVELY)),
+    ("W2-pretraining", "partly", actors((5, 5, 5), (1.5, 1.5, 1.5))),
+    ("W2-pretraining", "partly", actors((1, 2, 3), (1, 1, 1))),
+    ("W2-pretraining", "not", actors((1, 2, 3), LIVELY)),
+    ("W4-generator", "reproduced", fit(1, 2), likeness(skate=2.0), likeness(skate=1.7)),
+    ("W4-generator", "partly", fit(-1, 2), likeness(skate=2.0), likeness(skate=1.7)),
+    ("W4-generator", "not", fit(-1, 2), likeness(skate=2.0), likeness(skate=1.9)),
+    ("W8", "not testable here", hops(1.2, 1.0, 1.0)),
+    ("W8", "reproduced", hops(2.0, 1.1, 1.1)),
+    ("W8", "partly", hops(2.0, 1.1, 1.3)),
+    ("W8", "partly", hops(2.0, 1.5, 1.0)),
+    ("W8", "not", hops(2.0, 1.6, 1.0)),
+    ("W10", "reproduced", sizes(300, 30, 11)),
+    ("W10", "partly", sizes(300, 30, 9)),
+    ("W10", "not", sizes(9, 9, 9)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "case", CASES, ids=[f"{case[0]}-{case[1]}-{i}" for i, case in enumerate(CASES)]
+)
+def test_rule(case, verdicts, tmp_path):
+    identity, wanted, *results = case
+    claim = claim_of(identity)
+    for name, result in zip(verdicts.results_of(claim), results, strict=True):
+        (tmp_path / f"{name}.json").write_text(json.dumps(result), encoding="utf-8")
+    found = verdicts.judge(claim, tmp_path)
+    assert found.verdict == wanted
+    assert found.numbers or found.remark
+
+
+def test_every_rule_can_say_yes_and_no():
+    for identity in RULED:
+        said = {case[1] for case in CASES if case[0] == identity}
+        assert {"not", "partly" if identity == "W2-rate" else "reproduced"} <= said, identity
+
+
+def test_a_network_that_says_one_thing_only_has_no_variety(verdicts, tmp_path):
+    """And one that explodes in many ways has not either."""
+    claim = claim_of("W1-variety")
+    for ratios, sound in (([0.0] * 6, 1.0), ([0.0] * 6, 0.0)):
+        found = verdicts.w1_variety(claim["limits"], variety(ratios, sound))
+        assert found.verdict == "not"
+    assert verdicts.w1_variety(claim["limits"], variety([9.0] * 6, 0.0)).verdict == "partly"
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim["id"])
+def test_without_results_all_is_open_and_with_ours_all_is_a_verdict(claim, verdicts, tmp_path):
+    found = verdicts.judge(claim, tmp_path)
+    assert found.verdict == "open" and found.remark
+    assert verdicts.judge(claim).verdict in verdicts.VERDICTS
+
+
+def test_edge_of_learning_rates_is_said(verdicts):
+    limits = claim_of("W2-optimiser")["limits"]
+    assert "edge" in verdicts.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.003")).remark
+    assert not verdicts.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.001")).remark
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "said"),
+    [((3, 4, 5), (0, 1, 2), "better"), ((3, 4, 5), (0, 1, 3.5), "leaning"),
+     ((3, 4, 5), (2.9, 3.9, 4.9), "no different"), ((0, 1, 2), (3, 4, 5), "worse"),
+     ((-1e9, 4, 5), (3, 3, 3), "worse"), ((1, 1, 1), (-float("inf"), 0, 0), "better")],
+)  # fmt: skip
+def test_compare(a, b, said, verdicts):
+    assert verdicts.compare(a, b, 0.5) == said
+
+
+def test_verdicts_are_printed(verdicts, capsys):
+    verdicts.main(["W1", "W10"])
+    printed = capsys.readouterr().out
+    assert {"W1-variety", "W1-endless", "W10"} <= set(re.findall(r"^(\S+):", printed, re.M))
+    assert "W11" not in printed
+
+
+# -- motionlab reproduce --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def clone(tmp_path, monkeypatch):
+    """A repository without data, weights or results."""
+    (tmp_path / "experiments").mkdir()
+    text = (ROOT / "experiments" / "claims.yaml").read_text(encoding="utf-8")
+    (tmp_path / "experiments" / "claims.yaml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path / "experiments")  # a folder within will do
+    return tmp_path
+
+
+def touch(clone, *files):
+    for file in files:
+        (clone / file).parent.mkdir(parents=True, exist_ok=True)
+        (clone / file).write_text("")
+
+
+def commands(capsys):
+    lines = capsys.readouterr().out.splitlines()
+    return [line.split("   #")[0] for line in lines]
+
+
+def test_reproduce_lists_what_is_missing_in_order(clone, capsys):
+    touch(clone, "src/motionlab/weights/lstm-gmm.safetensors", "results/sizes.json")
+    Reproduce(("W10",), dry_run=True).run()
+    assert commands(capsys) == [
+        "motionlab prepare locomotion",
+        "python experiments/sizes.py",
+        "python experiments/verdicts.py W10",
+    ]
+    touch(clone, "runs/locomotion.npz")
+    Reproduce(("W1", "W8"), dry_run=True).run()
+    assert commands(capsys) == [
+        "python experiments/lstm_gmm_samples.py --model lstm-gmm",
+        "python experiments/initial_state.py --model lstm-gmm",
+        "python experiments/verdicts.py W1 W8",
+    ]
+
+
+def test_reproduce_trains_only_when_asked(clone, capsys):
+    with pytest.raises(MotionLabError, match=r"lstm-gmm\.safetensors.*--train"):
+        Reproduce(("W10",), dry_run=True).run()
+    Reproduce(("W10",), dry_run=True, train=True).run()
+    shown = commands(capsys)
+    assert shown[0] == "motionlab prepare locomotion"
+    assert shown[1] == "motionlab train lstm-gmm --preset ship"
+    assert shown[2].startswith("python experiments/ship_weights.py lstm-gmm ")
+
+
+def test_a_training_under_way_is_gone_on_with(clone, capsys):
+    touch(clone, "runs/locomotion.npz", "runs/lstm-gmm-ship/best.safetensors")
+    Reproduce(("W10",), dry_run=True, train=True).run()
+    assert commands(capsys)[0] == "motionlab train lstm-gmm --preset ship"
+
+
+@pytest.mark.parametrize(
+    ("names", "said"), [(("W99",), "no claim 'W99'"), (("W1", "Z1"), "Z1: is open")]
+)
+def test_reproduce_of_what_is_not_there(clone, names, said):
+    with pytest.raises(MotionLabError, match=said):
+        Reproduce(names, dry_run=True).run()
+
+
+def test_reproduce_outside_of_a_clone(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MotionLabError, match="not in a clone"):
+        Reproduce(("W1",)).run()
+
+
+def test_reproduce_runs_commands_in_the_root_and_stops_at_the_first_that_fails(clone, capfd):
+    script = "from pathlib import Path; Path('{}').write_text('')"
+    steps = [
+        {"makes": "a", "command": shlex.join(["python", "-c", script.format("a")])},
+        {"makes": "b", "needs": ["a"], "command": "python -c 'raise SystemExit(3)'"},
+        {"makes": "results/c.json", "needs": ["b"], "command": "python -c 'raise SystemExit(4)'"},
+    ]
+    book = {"claims": [{"id": "C1", "result": "c"}], "steps": steps}
+    (clone / "experiments" / "claims.yaml").write_text(yaml.safe_dump(book), encoding="utf-8")
+    with pytest.raises(MotionLabError, match="ended with 3"):
+        Reproduce(("C1",)).run()
+    assert (clone / "a").exists()
+    assert [step["makes"] for step in needed(steps, {"results/c.json"}, clone, False)] == [
+        "b",
+        "results/c.json",
+    ]
