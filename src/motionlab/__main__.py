@@ -153,15 +153,17 @@ class Prepare:
 
     source: Positional[Annotated[str, arg(metavar="NAME|FOLDER")]]
     """Data set, as `data list` names it, or a folder of BVH files."""
+    permissive: bool = False
+    """Leave out clips whose licence forbids commercial use."""
     out: Path | None = None
-    """File to write; runs/NAME.npz if left out."""
+    """File to write; runs/NAME.npz, or runs/NAME-permissive.npz, if left out."""
 
     def run(self) -> None:
         from .training import prepare
         from .training.prepared import file_of
 
-        out = self.out or file_of(self.source)
-        prepared = prepare(self.source, progress=True)
+        out = self.out or file_of(self.source, self.permissive)
+        prepared = prepare(self.source, progress=True, permissive=self.permissive)
         prepared.save(out)
         print(f"{out}: {len(prepared.names)} clips, {len(prepared.features)} frames, "
               f"hash {prepared.hash[:12]}")  # fmt: skip

@@ -128,3 +128,17 @@ def test_a_folder_of_bvh_files(tmp_path, monkeypatch):
     mine = Prepared.load("runs/mine.npz")
     assert mine.splits.count("train") == 2 * 6 and mine.splits.count("val") == 1
     assert mine.lengths.tolist() == [40] * len(mine.names)
+
+
+def test_permissive_data_may_be_used_commercially(real_clips, monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["prepare", "locomotion", "--permissive"]) == 0
+    data = Prepared.load(tmp_path / "runs" / "locomotion-permissive.npz")
+    sources = {name.split("/")[0] for name in data.names}
+    assert sources and all(datasets.info(source).commercial for source in sources)
+    assert len(data.clips("train")) > len(data.clips("val")) > 0
+
+
+def test_of_a_folder_nobody_knows_the_licences(tmp_path):
+    with pytest.raises(DataError, match="licences"):
+        prepare(tmp_path, permissive=True)

@@ -118,21 +118,24 @@ class Prepared:
         return made
 
 
-def file_of(source: str | os.PathLike) -> Path:
+def file_of(source: str | os.PathLike, permissive: bool = False) -> Path:
     """Where the command line keeps what it prepared of a data set or a folder."""
     name, known = Path(source).resolve().name, datasets.names()
     if name in known and str(source) not in known:
         name += "-folder"  # or it would be taken for the data set from then on
-    return Path("runs") / f"{name}.npz"
+    return Path("runs") / f"{name}{'-permissive' * permissive}.npz"
 
 
-def prepare(source: str | os.PathLike, progress: bool = False) -> Prepared:
+def prepare(
+    source: str | os.PathLike, progress: bool = False, *, permissive: bool = False
+) -> Prepared:
     """Load, bring to the canonical skeleton at 30 frames per second, encode.
 
     Parameters
     ----------
     source : the name of a data set, or a folder of BVH files.
     progress : show how far it is.
+    permissive : leave out clips whose licence forbids commercial use (of a data set).
 
     Training clips are used twice, the second time mirrored. Rows are those of `JointAngles` with
     contacts; see `Prepared.without_contacts`.
@@ -146,7 +149,7 @@ def prepare(source: str | os.PathLike, progress: bool = False) -> Prepared:
     encoding = JointAngles(Skeleton.canonical(), fps=FPS, contacts=True)
     features, names, splits = [], [], []
     for split in SPLITS:
-        motions = _load(source, split)
+        motions = _load(source, split, permissive)
         bar = tqdm(motions, f"encoding {split}", leave=False, unit="clip", disable=not progress)
         for motion in bar:
             features.append(encoding.encode(motion))
@@ -164,11 +167,17 @@ def prepare(source: str | os.PathLike, progress: bool = False) -> Prepared:
     return Prepared(rows, lengths, tuple(names), tuple(splits), encoding, normalizer, digest)
 
 
-def _load(source: str | os.PathLike, split: str) -> list[Motion]:
+def _load(source: str | os.PathLike, split: str, permissive: bool) -> list[Motion]:
     """Canonical clips of a split, in training with their mirror images."""
-    known = str(source) in datasets.names()
-    load = datasets.load if known else datasets.from_folder
-    motions = [motion.resample(FPS).retarget() for motion in load(source, split=split)]
+    if str(source) in datasets.names():
+        motions = datasets.load(source, split, permissive=permissive)
+    elif permissive:
+        raise DataError(
+            f"{source}: licences are known of named data sets only, not of a folder's clips."
+        )
+    else:
+        motions = datasets.from_folder(source, split=split)
+    motions = [motion.resample(FPS).retarget() for motion in motions]
     if split == "train":
         motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
     return motions
