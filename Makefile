@@ -38,7 +38,7 @@ clean:
 	touch $@
 
 # The editable installation also bundles the player from web/ (hatch_build.py).
-.venv/installed: .venv/requirements pyproject.toml hatch_build.py $(wildcard web/*.js* web/src/*)
+.venv/installed: .venv/requirements pyproject.toml hatch_build.py $(wildcard web/*.js* web/src/* web/src/*/*)
 	$(python) -m pip install --no-deps --no-build-isolation --editable .
 	touch $@
 

@@ -1,5 +1,6 @@
-"""What the book needs of Sphinx beyond its configuration: buttons, the player, the time budget."""
+"""What the book needs of Sphinx beyond its configuration: buttons, scripts, the time budget."""
 
+import os
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -27,9 +28,18 @@ def drop_buttons_without_repository(app: Sphinx, config) -> None:
     options["use_source_button"] = known
 
 
+def take_weights(app: Sphinx, config) -> None:
+    """Chapters leave the weights of networks that run in the page among the book's scripts."""
+    static = Path(app.outdir) / "_static"
+    for old in static.glob("motionlab-weights-*.js"):
+        old.unlink()
+    os.environ["MOTIONLAB_SCRIPTS"] = str(static)
+
+
 def add_player(app: Sphinx, pagename, templatename, context, doctree) -> None:
     """Load the one player script on the pages that hold a player."""
-    if "motionlab-player" in context.get("body", ""):
+    body = context.get("body", "")
+    if "motionlab-player" in body or "motionlab-dream" in body:
         app.add_js_file("motionlab-player.js", loading_method="defer")
 
 
@@ -53,6 +63,7 @@ def check_time(app: Sphinx, env) -> None:
 
 def setup(app: Sphinx) -> dict:
     app.connect("config-inited", drop_buttons_without_repository)
+    app.connect("config-inited", take_weights)
     app.connect("html-page-context", add_player)
     app.connect("env-updated", check_time)
     app.connect("build-finished", copy_scripts)

@@ -5,7 +5,7 @@
 Each page is opened from disk and from a local server, on a desktop and on a phone. It fails if a
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
 if a formula stays TeX; if a player stands still, or does not follow its slider; if a scene stays
-empty or does not follow its own. Exit status 1, and one line for each trouble. Needs Chromium on the
+empty or does not follow its own; if a network does not load and move, or too slowly. Exit status 1, and one line for each trouble. Needs Chromium on the
 PATH (or its path in CHROMIUM).
 """
 
@@ -35,8 +35,20 @@ FLAGS = [  # WebGL in software: the machine that checks may have no graphics car
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
-PLAYER, SCENE = ".motionlab-player", ".motionlab-scene iframe"
+PLAYER, SCENE, DREAM = ".motionlab-player", ".motionlab-scene iframe", ".motionlab-dream"
+WEIGHTS_BYTES = 8e6  # of a network that a page loads on a click
+STEP = 1000 / 30  # milliseconds that a network may take for a frame
 CONTRAST = 40  # of 255 levels of grey: less between the darkest and the lightest is nothing drawn
+
+
+FASTEST_STEP = """figure => {
+  const times = Array.from({ length: 20 }, () => {
+    const began = performance.now();
+    figure.motionlab.dreamer.advance();
+    return performance.now() - began;
+  });
+  return Math.min(...times);
+}"""
 
 
 class Visit:
@@ -155,6 +167,37 @@ class Visit:
         if not self._until(lambda: picture() != first):
             self.trouble(f"{name} shows the same picture wherever its slider stands")
 
+    def check_dreams(self) -> None:
+        if self.page.evaluate("'motionlabWeights' in globalThis"):
+            self.trouble("weights of a network came with the page; a click loads them")
+        for number in range(self.page.locator(DREAM).count()):
+            self._check_dream(number)
+
+    def _check_dream(self, number: int) -> None:
+        figure = self.page.locator(DREAM).nth(number)
+        name = f"network {number + 1}"
+        figure.scroll_into_view_if_needed()
+        try:
+            figure.locator("canvas").wait_for(timeout=PATIENCE)
+            figure.get_by_role("button", name="Load the network").click(timeout=PATIENCE)
+            figure.and_(self.page.locator("[data-live]")).wait_for(timeout=PATIENCE)
+        except TimeoutError:
+            said = figure.locator("p[role=status]").all_inner_texts()
+            self.trouble(f"{name} did not load: {' '.join(said)}")
+            return
+        frame = functools.partial(figure.evaluate, "f => f.motionlab.player.frame")
+        self._play(figure, True)
+        if not self._until(lambda: frame() > 10):
+            self.trouble(f"{name} does not move")
+        best = figure.evaluate(FASTEST_STEP)
+        if best > STEP:
+            self.trouble(f"{name} takes {best:.0f} ms for a frame")
+        size = figure.evaluate(
+            "f => JSON.stringify(motionlabWeights[f.motionlab.live.name] ?? '').length"
+        )
+        if size > WEIGHTS_BYTES:
+            self.trouble(f"{name} weighs {size / 1e6:.1f} MB")
+
     def _until(self, done: Callable[[], bool]) -> bool:
         """Whether it was done in time: drawing in software may take its while."""
         end = time.monotonic() + PATIENCE / 1000
@@ -233,6 +276,7 @@ def check_page(window: BrowserContext, base: str, path: Path, folder: Path) -> l
     if visit.page.viewport_size["width"] == DESKTOP[0]:
         visit.check_players()
         visit.check_scenes()
+        visit.check_dreams()
     weight = own_weight(visit.loaded, base, folder)
     if weight > PAGE_BYTES:
         visit.trouble(f"weighs {weight / 1e6:.1f} MB, allowed {PAGE_BYTES / 1e6} MB")

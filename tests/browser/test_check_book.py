@@ -27,6 +27,16 @@ FAULTS = {
         '<figure class="motionlab-player"><canvas></canvas><button>Play</button>'
         '<input type="range" max="100"></figure>'
     ),
+    "network 1 did not load: nothing beside": (
+        '<figure class="motionlab-dream"><canvas></canvas><button>Load the network</button>'
+        '<p role="status">nothing beside this page</p></figure>'
+    ),
+    "network 1 takes": (
+        '<figure class="motionlab-dream" data-live><canvas></canvas>'
+        "<button>Load the network</button><script>motionlabWeights = {};"
+        "document.currentScript.parentElement.motionlab = {live: {}, player: {frame: 99}, dreamer: "
+        "{advance() { for (const t = Date.now() + 60; Date.now() < t; ); }}}</script></figure>"
+    ),
     "scene 1 did not start": scene("The script of this scene is missing beside the page."),
     "scene 1 draws nothing": scene("<canvas></canvas>"),
     "scene 1 shows the same picture": scene("<canvas width=50 style='background: black'></canvas>"),

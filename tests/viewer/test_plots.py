@@ -132,3 +132,16 @@ def test_a_fan_draws_every_path_and_the_true_one():
     assert len(left.lines) == len(right.lines) == 8
     assert np.allclose(left.lines[3].get_xydata(), paths[3])
     assert left.get_xlim() == right.get_xlim()
+
+
+def test_shares_fill_the_whole_and_contacts_lie_below():
+    left = np.array([0.2, 0.7, 1.0])
+    (axes,) = plots.shares(
+        {"left": left, "right": 1 - left}, fps=10, y="weight", below={"toes": [True, True, False]}
+    ).axes
+    lower, upper, bars = axes.collections
+    assert np.allclose(upper.get_paths()[0].vertices[:, 1].max(), 1)
+    assert np.allclose(lower.get_paths()[0].vertices[:, 0].max(), 0.2)  # seconds
+    extent = bars.get_paths()[0].get_extents()
+    assert np.allclose((extent.x0, extent.x1), (0, 0.2)) and extent.y1 < 0
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["0", "0.5", "1", "toes"]

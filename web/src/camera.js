@@ -4,23 +4,6 @@ import { PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 const FIELD = 30; // degrees, vertical
-const SMOOTH = 0.45; // seconds on each side over which the followed path is averaged
-
-/** Running mean of a track's root on the floor: x, z per stored frame. No lag, same in any order. */
-export function smoothCourse(track, fps) {
-  let course = Array.from({ length: track.stored }, (_, i) => [track.root[3 * i] * 1e-4, track.root[3 * i + 2] * 1e-4]);
-  const half = Math.round((SMOOTH * fps) / track.stride);
-  for (let pass = 0; pass < 2; pass++) {
-    const sums = [[0, 0]];
-    for (const [x, z] of course) sums.push([sums.at(-1)[0] + x, sums.at(-1)[1] + z]);
-    course = course.map((_, i) => {
-      const reach = Math.min(half, i, course.length - 1 - i); // symmetric, so the ends stay put
-      const [from, to] = [sums[i - reach], sums[i + reach + 1]];
-      return [0, 1].map((axis) => (to[axis] - from[axis]) / (2 * reach + 1));
-    });
-  }
-  return course;
-}
 
 export class Orbit {
   constructor(canvas, damping) {

@@ -5,6 +5,7 @@ import { LineGeometry } from "three/addons/lines/LineGeometry.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 
 const CONTACT = "#ff5a36";
+const TAIL = 90; // frames
 
 function line(positions, color, pixels) {
   const geometry = new LineGeometry();
@@ -58,6 +59,24 @@ export class Trail extends Group {
 
   update() {
     if (this.line) this.line.geometry.instanceCount = this.track.now;
+  }
+}
+
+/** The last seconds of a point of a motion that is still being made. */
+export class Tail extends Group {
+  constructor(track, point) {
+    super();
+    Object.assign(this, { track, point, places: new Float32Array(3 * TAIL) });
+    this.line = line(this.places, track.color, 3);
+    this.add(this.line);
+  }
+
+  update() {
+    this.track.tail(this.point, this.places);
+    // a Line2 keeps both ends of every piece, one piece after the other
+    const ends = this.line.geometry.attributes.instanceStart.data;
+    for (let piece = 0; piece + 1 < TAIL; piece++) ends.array.set(this.places.subarray(3 * piece, 3 * piece + 6), 6 * piece);
+    ends.needsUpdate = true;
   }
 }
 

@@ -2,10 +2,11 @@
 
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 const ROOT_UNIT = 1e-4; // metres
+const SMOOTH = 0.45; // seconds on each side over which the followed path is averaged
 
 /** One motion: decodes positions frame by frame, so that 10 s of 57 points cost nothing at start. */
 export class Track {
-  constructor(data, stride) {
+  constructor(data, stride, fps) {
     Object.assign(this, { label: data.label, color: data.color, bones: data.bones, extras: data.extras });
     this.stride = stride; // motion frames from one stored frame to the next
     this.stored = data.frames;
@@ -18,6 +19,7 @@ export class Track {
     this.points = new Float32Array(3 * (this.pointCount + this.extras.length));
     this.rootNow = [0, 0, 0];
     this.now = 0;
+    this.way = smoothCourse(this, fps);
   }
 
   /** Fill `points` (metres) for a frame of the motion; frames between stored ones are mixed. */
@@ -37,12 +39,7 @@ export class Track {
       const from = local[before * width + i];
       points[i] = (from + mix * (local[after * width + i] - from)) * scale + this.rootNow[i % 3];
     }
-    this.extras.forEach(([a, b, along], extra) => {
-      for (let axis = 0; axis < 3; axis++) {
-        const from = points[3 * a + axis];
-        points[3 * (pointCount + extra) + axis] = from + along * (points[3 * b + axis] - from);
-      }
-    });
+    addExtras(points, pointCount, this.extras);
   }
 
   /** Position of a point as [x, y, z] after `seek`. */
@@ -76,6 +73,21 @@ export class Track {
     return top;
   }
 
+  /** Smoothed place [x, z] on the floor at a frame of the motion. */
+  place(frame) {
+    const at = Math.min(frame / this.stride, this.stored - 1);
+    const [a, b] = [this.way[Math.floor(at)], this.way[Math.min(Math.floor(at) + 1, this.stored - 1)]];
+    return [0, 1].map((axis) => a[axis] + (at % 1) * (b[axis] - a[axis]));
+  }
+
+  /** Direction on the floor from the start to the farthest place; +z if it hardly moves. */
+  heading() {
+    const [x0, z0] = this.way[0];
+    const far = (at) => Math.hypot(at[0] - x0, at[1] - z0);
+    const [x, z] = this.way.reduce((best, at) => (far(at) > far(best) ? at : best));
+    return far([x, z]) < 0.5 ? [0, 1] : [x - x0, z - z0];
+  }
+
   /** Corners [min x, min z, max x, max z] of the ground that the root covers. */
   get extent() {
     if (this.box) return this.box;
@@ -92,7 +104,33 @@ export class Track {
   }
 }
 
+/** Running mean of a track's root on the floor: x, z per stored frame. No lag, same in any order. */
+function smoothCourse(track, fps) {
+  let course = Array.from({ length: track.stored }, (_, i) => [track.root[3 * i] * 1e-4, track.root[3 * i + 2] * 1e-4]);
+  const half = Math.round((SMOOTH * fps) / track.stride);
+  for (let pass = 0; pass < 2; pass++) {
+    const sums = [[0, 0]];
+    for (const [x, z] of course) sums.push([sums.at(-1)[0] + x, sums.at(-1)[1] + z]);
+    course = course.map((_, i) => {
+      const reach = Math.min(half, i, course.length - 1 - i); // symmetric, so the ends stay put
+      const [from, to] = [sums[i - reach], sums[i + reach + 1]];
+      return [0, 1].map((axis) => (to[axis] - from[axis]) / (2 * reach + 1));
+    });
+  }
+  return course;
+}
+
+/** Points on the line through two others (heels, the waist), behind the skeleton's own. */
+export function addExtras(points, count, extras) {
+  extras.forEach(([a, b, along], extra) => {
+    for (let axis = 0; axis < 3; axis++) {
+      const from = points[3 * a + axis];
+      points[3 * (count + extra) + axis] = from + along * (points[3 * b + axis] - from);
+    }
+  });
+}
+
 export function decode(payload) {
   if (payload.version !== 1) throw new Error(`motion payload of version ${payload.version}; this player reads 1`);
-  return payload.tracks.map((data) => new Track(data, payload.stride));
+  return payload.tracks.map((data) => new Track(data, payload.stride, payload.fps));
 }

@@ -1,7 +1,10 @@
-// Entry of the script for built pages: makes a player of every figure that Python wrote.
+// Entry of the script for built pages: brings every figure that Python wrote to life.
+import { Dream } from "./network/dream.js";
 import { Player } from "./player.js";
 
-function mount(figure) {
+const KINDS = { "motionlab-player": Player, "motionlab-dream": Dream };
+
+function mount(figure, Kind) {
   const data = figure.querySelector('script[type="application/json"]');
   if (!data || figure.motionlab) return;
   // With scripting on, a browser keeps the content of <noscript> as mere text.
@@ -9,9 +12,8 @@ function mount(figure) {
   const still = fallback.querySelector("img")?.getAttribute("src");
   const caption = figure.querySelector("figcaption");
   try {
-    const player = new Player(figure, JSON.parse(data.textContent), still);
+    figure.motionlab = new Kind(figure, JSON.parse(data.textContent), still);
     data.textContent = ""; // decoded: free the text
-    figure.motionlab = player;
   } catch (error) {
     const note = Object.assign(document.createElement("p"), { textContent: `This motion can't be shown: ${error.message}` });
     figure.prepend(note);
@@ -19,7 +21,11 @@ function mount(figure) {
   if (caption) figure.append(caption);
 }
 
-const mountAll = () => document.querySelectorAll("figure.motionlab-player").forEach(mount);
+function mountAll() {
+  for (const [name, Kind] of Object.entries(KINDS)) {
+    document.querySelectorAll(`figure.${name}`).forEach((figure) => mount(figure, Kind));
+  }
+}
 
 if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", mountAll);
 else mountAll();

@@ -1,6 +1,6 @@
 // The motion player: puts figures, marks, camera, clock and controls together in one element.
 import { Bar } from "./bar.js";
-import { Orbit, smoothCourse } from "./camera.js";
+import { Orbit } from "./camera.js";
 import { Clock } from "./clock.js";
 import { Mannequin } from "./mannequin.js";
 import { Contacts, disposeAll, Path, Trail } from "./marks.js";
@@ -14,20 +14,22 @@ const SLOW = 0.05; // seconds from picture to picture above which they get fewer
 const LEAST_HEIGHT = 1.5; // metres that a view shows
 
 export class Player {
-  /** Build the player inside `host`. `still` is an image URL for machines without WebGL. */
-  constructor(host, payload, still) {
+  /**
+   * Build the player inside `host`. `still` is an image URL for machines without WebGL. Tracks and
+   * clock are those of the payload, unless the motion is still being made.
+   */
+  constructor(host, payload, still, tracks = decode(payload), clock = new Clock(payload.frames, payload.fps)) {
     addStyle(host);
     this.host = host;
     this.still = still;
-    this.tracks = decode(payload);
+    this.tracks = tracks;
     this.payload = payload;
-    this.clock = new Clock(payload.frames, payload.fps);
+    this.clock = clock;
     this.clock.speed = payload.speed ?? 1;
     this.follow = payload.follow ?? true;
     this.overlay = payload.overlay ?? false;
     this.visible = false;
     this.dirty = true;
-    this.courses = this.tracks.map((track) => smoothCourse(track, payload.fps));
     // At least as tall as a man standing, so that a crawling body looks as small as it is.
     this.tall = Math.max(...this.tracks.map((track) => track.top() - payload.floor), LEAST_HEIGHT);
     this.build(payload);
@@ -38,7 +40,7 @@ export class Player {
     this.refresh();
   }
 
-  build({ height, frames, fps }) {
+  build({ height, frames, fps, duration = `${(frames / fps).toFixed(1)} seconds` }) {
     this.view = document.createElement("div");
     this.view.className = "ml-view";
     this.view.style.height = `${height}px`;
@@ -48,7 +50,7 @@ export class Player {
     const names = this.tracks.map((track) => track.label).filter(Boolean).join(", ") || "a motion";
     this.canvas.setAttribute(
       "aria-label",
-      `Moving figure: ${names}, ${(frames / fps).toFixed(1)} seconds. Space plays and pauses, arrow keys ` +
+      `Moving figure: ${names}, ${duration}. Space plays and pauses, arrow keys ` +
         "step, Home and End jump, Shift with arrows turns the view, plus and minus zoom, F follows, R resets.",
     );
     this.labels = document.createElement("div");
@@ -88,14 +90,19 @@ export class Player {
     // Pixels of the picture per pixel of the page: while it rests, and while it moves.
     this.fine = this.stage.software ? 1.5 : Math.min(globalThis.devicePixelRatio || 1, 2);
     this.coarse = this.stage.software ? 1 : this.fine;
-    const paths = this.payload.paths ?? [];
-    this.casts = this.tracks.map((track, i) => [
-      new Mannequin(track),
-      ...(track.contacts ? [new Contacts(track, this.payload.floor)] : []),
-      ...(this.payload.trail ?? []).map((point) => new Trail(track, point)),
-      ...paths.filter((path) => path.track == null || path.track === i).map((path) => new Path(path, this.payload.floor)),
-    ]);
+    this.casts = this.tracks.map((track, i) => this.cast(track, i));
     this.dirty = true;
+  }
+
+  /** What is drawn of a track. */
+  cast(track, i) {
+    const { floor, trail = [], paths = [] } = this.payload;
+    return [
+      new Mannequin(track),
+      ...(track.contacts ? [new Contacts(track, floor)] : []),
+      ...trail.map((point) => new Trail(track, point)),
+      ...paths.filter((path) => path.track == null || path.track === i).map((path) => new Path(path, floor)),
+    ];
   }
 
   sayMissing() {
@@ -205,7 +212,7 @@ export class Player {
 
   /** Take the starting view; with `keepAngle` only the distance changes. */
   lookFromStart(keepAngle = false) {
-    const [dx, dz] = heading(this.courses[0]);
+    const [dx, dz] = this.tracks[0].heading();
     const arm = this.orbit.eye.position;
     this.azimuth = Math.atan2(dx, dz) + 0.9;
     const azimuth = keepAngle ? Math.atan2(arm.x, arm.z) : this.azimuth;
@@ -220,25 +227,17 @@ export class Player {
     for (let frame = 0; frame < this.clock.frames; frame += Math.max(1, this.clock.frames >> 6)) {
       const middle = this.middle(cell, frame);
       for (const i of cell) {
-        const [x, z] = this.at(i, frame);
+        const [x, z] = this.tracks[i].place(frame);
         most = Math.max(most, Math.hypot(x - middle.x, z - middle.z));
       }
     }
     return Math.min(Math.max(most - 0.3, 0), 30);
   }
 
-  /** Smoothed place of a track on the floor. */
-  at(track, frame) {
-    const course = this.courses[track];
-    const at = Math.min(frame / this.payload.stride, course.length - 1);
-    const [a, b] = [course[Math.floor(at)], course[Math.min(Math.floor(at) + 1, course.length - 1)]];
-    return [0, 1].map((axis) => a[axis] + (at % 1) * (b[axis] - a[axis]));
-  }
-
   /** Where a view looks: along with its bodies, or at the middle of where they go. */
   middle(cell, frame) {
     if (this.follow) {
-      const places = cell.map((i) => this.at(i, frame));
+      const places = cell.map((i) => this.tracks[i].place(frame));
       const mean = (axis) => places.reduce((sum, place) => sum + place[axis], 0) / places.length;
       return { x: mean(0), z: mean(1) };
     }
@@ -324,13 +323,6 @@ export class Player {
     this.orbit.dispose();
     for (const actor of this.casts?.flat() ?? []) disposeAll(actor);
   }
-}
-
-/** Direction on the floor from a course's start to its farthest place; +z if it hardly moves. */
-function heading(course) {
-  const [x0, z0] = course[0];
-  const [x, z] = course.reduce((far, at) => (Math.hypot(at[0] - x0, at[1] - z0) > Math.hypot(far[0] - x0, far[1] - z0) ? at : far));
-  return Math.hypot(x - x0, z - z0) < 0.5 ? [0, 1] : [x - x0, z - z0];
 }
 
 /** Columns that give the views the most upright, yet not too narrow, shape. */

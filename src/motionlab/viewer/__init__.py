@@ -3,6 +3,7 @@
 from importlib import import_module
 
 from . import palette
+from .dream import dream
 from .player import Player, bundle_path
 from .show import show
 
@@ -11,6 +12,7 @@ _STILLS = ("still", "filmstrip", "video")
 __all__ = [
     "Player",
     "bundle_path",
+    "dream",
     "filmstrip",
     "palette",
     "plots",

@@ -207,6 +207,33 @@ def over_time(lines: Mapping[str, Sequence[float]], fps: float, y: str) -> Figur
 
 
 @styled
+def shares(
+    parts: Mapping[str, Sequence[float]],
+    fps: float,
+    y: str,
+    below: Mapping[str, Sequence[bool]] | None = None,
+) -> Figure:
+    """Shares of a whole over seconds, one on top of the other.
+
+    below : {name: a truth value a frame}, drawn as bars under the shares, such as contacts.
+    """
+    _check_named("shares", parts)
+    _check_rate("shares", fps)
+    below = below or {}
+    figure, axes = plt.subplots(figsize=(7.5, 3 + 0.3 * len(below)))
+    time = np.arange(len(next(iter(parts.values())))) / fps
+    colors = [palette.color(name, index) for index, name in enumerate(parts)]
+    axes.stackplot(time, *parts.values(), labels=list(parts), colors=colors, lw=0)
+    rows = [-0.1 - 0.12 * index for index in range(len(below))]
+    for row, on in zip(rows, below.values(), strict=True):
+        _spans(axes, time, np.asarray(on, dtype=bool), row, INK, height=0.08)
+    axes.set_yticks([0, 0.5, 1, *rows], ["0", "0.5", "1", *below])
+    axes.set(xlabel="time (s)", ylabel=y, ylim=(min([0, *rows]) - 0.06 * bool(below), 1))
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=len(parts), fontsize=8)
+    return figure
+
+
+@styled
 def feature_maps(maps: Mapping[str, Sequence], fps: float, groups: Mapping[str, Mapping]) -> Figure:
     """What a network sees: features as rows of colour over time, one picture a name.
 

@@ -84,14 +84,14 @@ def show(
         tracks,
         rate,
         paths=_paths(paths, len(motions)),
-        trail=_trail(trail, tracks),
+        trail=trail_points(trail, tracks),
         height=int(height),
         overlay=bool(overlay),
         follow=True,
         autoplay=bool(autoplay),
     )
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
-        return PagePlayer(page_html(data, _still(tracks[0]), caption))
+        return PagePlayer(page_html(data, still_picture(tracks[0]), caption))
     return Player(data, caption=caption or "")
 
 
@@ -244,7 +244,8 @@ def _paths(paths: Any, count: int) -> list[dict[str, Any]]:
     return made
 
 
-def _trail(trail: Any, tracks: list[Track]) -> list[int]:
+def trail_points(trail: Any, tracks: list[Track]) -> list[int]:
+    """Point indices of what `show` calls its trail."""
     if trail is None:
         return []
     skeleton = tracks[0].skeleton
@@ -267,7 +268,7 @@ def _point(skeleton: Skeleton, name: str) -> int:
     return skeleton.index(name)  # a role, or an error that lists what there is
 
 
-def _still(track: Track) -> str:
+def still_picture(track: Track) -> str:
     """What is seen without scripts: the middle of the motion, as a data URL of a few kilobytes."""
     from .stills import still
 

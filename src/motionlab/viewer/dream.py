@@ -1,0 +1,341 @@
+"""Let a network dream under sliders; in a page it runs in the reader's browser.
+
+A page has no kernel. So the weights travel as a script beside the page, rounded to a byte each, and
+are loaded when the reader asks for them; web/src/network/ holds the network in plain JavaScript.
+Until then, and where nothing can be loaded, the figure plays clips that were sampled beforehand.
+"""
+
+from __future__ import annotations
+
+import base64
+import copy
+import hashlib
+import html
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ..encodings import JointAngles
+from ..errors import ViewerError
+from . import palette
+from .body import body
+from .player import Track, bundle_path, payload
+from .show import still_picture, trail_points
+
+GLOBAL = "motionlabWeights"  # where the page looks for what a script of weights brings
+
+
+@dataclass(frozen=True)
+class Control:
+    """A setting that the reader may change: the same in a page and in a notebook's widgets."""
+
+    name: str  # as `generate` calls it, where it knows it
+    label: str
+    help: str
+    min: float
+    max: float
+    step: float
+    value: float
+
+
+CONTROLS = (
+    Control("start", "Start", "What the body was doing before the network took over", 0, 0, 1, 0),
+    Control("temperature", "Temperature", "Factor on the standard deviations: 1 is what was "
+            "learned, less is calmer", 0.05, 2, 0.05, 1),
+    Control("component_temperature", "Component temperature", "Near 0 the likeliest component "
+            "always wins; 1 is what was learned", 0.05, 2, 0.05, 1),
+    Control("noise", "Input noise", "Standard deviation of what is added to all that the network "
+            "sees", 0, 0.3, 0.01, 0),
+    Control("characters", "Characters", "As many futures of the same start", 1, 6, 1, 1),
+    Control("seed", "Seed", "The same seed gives the same motion", 0, 9999, 1, 0),
+)  # fmt: skip
+
+
+def dream(
+    model: nn.Module,
+    *,
+    seconds: float = 8.0,
+    characters: int = 1,
+    trail: str | int | Sequence[str | int] = ("hips", "left_toes", "right_toes"),
+    color: str = "RNN",
+    caption: str | None = None,
+    height: int = 380,
+) -> Any:
+    """Let a trained network go on from one of its starts, under sliders.
+
+    In a running kernel Python samples, and ipywidgets act on it; see `dream_live`. In a built page
+    the network itself runs, without end: see `page_figure`.
+
+    Parameters
+    ----------
+    model : as `motionlab.load` gives it.
+    seconds : of the motion that Python samples; in a page, one for each start.
+    characters : how many futures of a start there are at first.
+    trail : joints (names, roles or point indices) that leave a trail.
+    color : a method's name or a colour.
+    caption : a text below the figure.
+    height : of the picture, pixels.
+
+    Raises
+    ------
+    ViewerError : another kind of model, or one without starts.
+    """
+    look = {"trail": trail, "color": color, "caption": caption, "height": height}
+    if os.environ.get("MOTIONLAB_VIEWER") == "page":
+        return page_figure(model, seconds=seconds, characters=characters, **look)
+    from .dream_live import controls
+
+    return controls(model, seconds=seconds, characters=characters, **look)
+
+
+def page_figure(
+    model: nn.Module,
+    *,
+    seconds: float = 8.0,
+    characters: int = 1,
+    trail: str | int | Sequence[str | int] = ("hips", "left_toes", "right_toes"),
+    color: str = "RNN",
+    caption: str | None = None,
+    height: int = 380,
+    facts: Mapping[str, str] | None = None,
+) -> Dream:
+    """What `dream` is in a built page: no kernel, no server, also from disk.
+
+    Parameters as of `dream`, and `facts`, what else to say about the weights. The model must be an
+    `LstmGmm` on `JointAngles` with rotation vectors.
+    """
+    _check(model)
+    name = model.about.get("name", "network") if hasattr(model, "about") else "network"
+    weights = weights_script(model, name)
+    tracks = _clips(model, round(seconds * model.fps), palette.check_color(color))
+    common = {"height": height, "autoplay": True, "trail": trail_points(trail, tracks)}
+    clips = [payload([track], model.fps, follow=True, overlay=False, **common) for track in tracks]
+    dress = body(model.encoding.skeleton)
+    live = {
+        **common,
+        "name": weights.name,
+        "script": f"_static/{weights.file}",
+        "megabytes": f"{len(weights.text) / 1e6:.1f}",
+        "floor": float(np.median([clip["floor"] for clip in clips])),
+        "look": {
+            "label": "",
+            "color": palette.check_color(color),
+            "bones": [list(bone) for bone in dress.bones],
+            "extras": [list(extra) for extra in dress.extras],
+            "contactPoints": list(dress.feet),
+            "contacts": "contacts" in model.encoding.slices,
+            "tall": max(float(track.positions[..., 1].max()) for track in tracks),
+        },
+    }
+    values = {"characters": characters, **getattr(model, "sampling", {})}
+    content = {
+        "clips": clips,
+        "live": live,
+        "starts": list(model.start_names),
+        "controls": [asdict(c) | {"value": values.get(c.name, c.value)} for c in CONTROLS],
+        "facts": [*_provenance(model, weights), *(facts or {}).items()],
+    }
+    return Dream(content, weights, still_picture(tracks[0]), caption)
+
+
+class Dream:
+    """The figure of a page. In a book it finds its weights in ``_static``; elsewhere it brings them
+    along."""
+
+    def __init__(self, content: dict, weights: WeightsScript, still: str, caption: str | None):
+        self.content, self.weights, self.still, self.caption = content, weights, still, caption
+
+    def _repr_html_(self) -> str:
+        folder = os.environ.get("MOTIONLAB_SCRIPTS")  # set by a book's build
+        if folder:
+            self.weights.write(folder)
+            return self.html
+        page = html.escape(self.page(), quote=True)
+        height = self.content["live"]["height"] + 420
+        return f'<iframe srcdoc="{page}" style="border:0;width:100%;height:{height}px"></iframe>'
+
+    @property
+    def html(self) -> str:
+        """The figure for a page that has the player's script."""
+        # "</script>" inside a string would end the element: escape every "<".
+        data = json.dumps(self.content, separators=(",", ":")).replace("<", "\\u003c")
+        text = f"<figcaption>{html.escape(self.caption)}</figcaption>" if self.caption else ""
+        return (
+            '<figure class="motionlab-dream" style="margin:1rem 0">'
+            f'<script type="application/json">{data}</script>'
+            f'<noscript><img src="{self.still}" alt="Still picture of a sampled motion" '
+            f'style="max-width:100%"></noscript>{text}</figure>'
+        )
+
+    def page(self) -> str:
+        """A page that needs no other file."""
+        scripts = [bundle_path().read_text(encoding="utf-8"), self.weights.text]
+        # the words would end the element
+        scripts = [script.replace("</script", r"<\/script") for script in scripts]
+        inline = "".join(f"<script>{script}</script>" for script in scripts)
+        return (
+            '<!doctype html><html lang="en"><meta charset="utf-8">'
+            '<meta name="viewport" content="width=device-width"><title>dream</title>'
+            f'{inline}<body style="margin:8px">{self.html}</body></html>'
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write a page that holds figure, player and weights; returns its path."""
+        path = Path(path)
+        path.write_text(self.page(), encoding="utf-8")
+        return path
+
+
+def _check(model: nn.Module) -> None:
+    kind = type(model).__name__
+    if kind != "LstmGmm":
+        raise ViewerError(f"The browser can run an LstmGmm, not a {kind}.")
+    encoding = model.encoding
+    if not isinstance(encoding, JointAngles) or encoding.rotation != "vector":
+        raise ViewerError(
+            "The browser knows features of JointAngles with rotation='vector' only; this model has "
+            f"{type(encoding).__name__}."
+        )
+    if not getattr(model, "start_names", ()):
+        raise ViewerError(
+            "This model has no states to start from; motionlab.load gives it some, or set "
+            "model.starts = model.observe(features) and model.start_names = ('name', ...)."
+        )
+
+
+@torch.no_grad()
+def _clips(model: nn.Module, frames: int, color: str) -> list[Track]:
+    """One motion from each start, sampled as the sliders stand at first."""
+    chance = torch.Generator().manual_seed(0)
+    sampling = getattr(model, "sampling", {})
+    sampled = model.generate(frames, model.starts, generator=chance, **sampling)
+    features = torch.cat([model.starts.frame[:, None], sampled], dim=1)
+    motions = [model.encoding.to_motion(row) for row in features]
+    skeleton = model.encoding.skeleton
+    return [Track(m.positions(), skeleton, "", color, m.contacts) for m in motions]
+
+
+# -- weights ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class WeightsScript:
+    """Weights as a script that a page, also one opened from disk, can load."""
+
+    name: str  # the page knows them by it
+    text: str
+
+    @property
+    def file(self) -> str:
+        return f"motionlab-weights-{self.name}.js"
+
+    def write(self, folder: str | Path) -> Path:
+        path = Path(folder) / self.file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(self.text, encoding="utf-8")
+        return path
+
+
+def weights_script(model: nn.Module, name: str, rounded: bool = True) -> WeightsScript:
+    """All that web/src/network/weights.js reads; `rounded` to a byte a weight, or float32."""
+    layers = {
+        part: [_pack(*layer, rounded) for layer in group] for part, group in _layers(model).items()
+    }
+    encoding, normalizer, starts = model.encoding, model.normalizer, model.starts
+    skeleton = encoding.skeleton
+    content = {
+        "width": model.width,
+        "components": model.components,
+        "skip": model.skip,
+        "reach": model.reach,
+        "fps": model.fps,
+        "kept": normalizer.kept.tolist(),
+        "mean": _base64(normalizer.mean),
+        "std": _base64(normalizer.std),
+        "floor": _base64(model.floor),
+        "layers": {**layers, "leave": layers["leave"][0]},
+        "encoding": {
+            "parents": list(skeleton.parents),
+            "offsets": skeleton.offsets.tolist(),
+            "end_parents": list(skeleton.end_parents),
+            "end_offsets": skeleton.end_offsets.tolist(),
+            "mean_pose": encoding.mean_pose.flatten(1).tolist(),
+            "contacts": "contacts" in encoding.slices,
+        },
+        "starts": [
+            {"name": label, **{key: _base64(part[i]) for key, part in starts._asdict().items()}}
+            for i, label in enumerate(model.start_names)
+        ],
+    }
+    data = json.dumps(content, separators=(",", ":"))
+    name = f"{name}-{hashlib.sha256(data.encode()).hexdigest()[:8]}"  # no stale copy from a cache
+    key = json.dumps(name)
+    text = f"globalThis.{GLOBAL} = globalThis.{GLOBAL} || {{}};\n{GLOBAL}[{key}] = {data};\n"
+    return WeightsScript(name, text)
+
+
+def as_in_browser(model: nn.Module) -> nn.Module:
+    """A copy whose weights are rounded as they are for the browser, to measure what that costs."""
+    model = copy.deepcopy(model)
+    for group in _layers(model).values():
+        for matrices, _ in group:
+            whole, scales = _round(torch.cat([m.detach() for m in matrices], dim=1))
+            parts = (whole * scales[:, None]).split([m.shape[1] for m in matrices], dim=1)
+            for matrix, part in zip(matrices, parts, strict=True):
+                matrix.data.copy_(part)
+    return model
+
+
+def _layers(model: nn.Module) -> dict[str, list[tuple[list[Tensor], Tensor]]]:
+    """Matrices, side by side, and bias of every layer. An LSTM's two biases are only ever added."""
+    parts = model.lstm.all_weights  # [W_ih, W_hh, b_ih, b_hh] a layer
+    return {
+        "enter": [([layer.weight], layer.bias) for layer in (model.enter[0], model.enter[2])],
+        "lstm": [([w_ih, w_hh], b_ih + b_hh) for w_ih, w_hh, b_ih, b_hh in parts],
+        "leave": [([model.leave.weight], model.leave.bias)],
+    }
+
+
+def _pack(matrices: list[Tensor], bias: Tensor, rounded: bool) -> dict[str, Any]:
+    matrix = torch.cat(matrices, dim=1).detach()
+    packed = {"columns": matrix.shape[1], "bias": _base64(bias)}
+    if not rounded:
+        return packed | {"weight": _base64(matrix)}
+    whole, scales = _round(matrix)
+    return packed | {"weight": _base64(whole, "i1"), "scales": _base64(scales)}
+
+
+def _round(matrix: Tensor) -> tuple[Tensor, Tensor]:
+    """Whole numbers from -127 to 127 (rows, columns) and what one of them stands for, (rows,)."""
+    scales = matrix.abs().amax(1).clamp(min=1e-12) / 127
+    return (matrix / scales[:, None]).round(), scales
+
+
+def _base64(values: Tensor, kind: str = "<f4") -> str:
+    array = values.detach().cpu().numpy().astype(kind)
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+
+
+def _provenance(model: nn.Module, weights: WeightsScript) -> list[tuple[str, str]]:
+    """What a reader may want to know of the weights; as much of it as the model says."""
+    about = getattr(model, "about", {})
+    parameters = sum(parameter.numel() for parameter in model.parameters())
+    made = about.get("preset", {})
+    known = {
+        "Weights": about.get("name"),
+        "sha256": getattr(model, "hash", None),
+        "Network": f"LSTM of 2 × {model.width}, {model.components} Gaussians, {parameters:,} numbers",
+        "In this page": f"{weights.file}: whole numbers of a byte, and a scale for each row",
+        "Made by": about.get("command"),
+        "Seed": made.get("seed"),
+        "Data": about.get("data_name"),
+        "sha256 of the data": about.get("data"),
+    }
+    return [(name, str(value)) for name, value in known.items() if value not in (None, "")]

@@ -1,0 +1,134 @@
+"""Sliders that act on a network in a running kernel: the live form of `motionlab.viewer.dream`.
+
+The page form steps the network in the browser, without end. Here Python samples a few seconds as
+soon as a slider is let go, and the player plays them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import ipywidgets
+import torch
+from torch import Tensor, nn
+
+from ..errors import MotionLabError, ViewerError
+from . import palette
+from .dream import CONTROLS, Control
+from .player import Player, Track, payload
+from .show import trail_points
+
+TRAIL = ("hips", "left_toes", "right_toes")
+SECONDS = Control("seconds", "Seconds", "How long the motion is", 1, 60, 1, 10)
+# Room for the longest label; else it is cut off.
+_STYLE = {"description_width": "150px"}
+_LAYOUT = ipywidgets.Layout(width="420px")
+
+
+def controls(
+    model: nn.Module,
+    *,
+    seconds: float = 10.0,
+    characters: int = 1,
+    trail: str | int | Sequence[str | int] = TRAIL,
+    color: str = "RNN",
+    caption: str | None = None,
+    height: int = 380,
+) -> ipywidgets.VBox:
+    """A player with sliders for all that `generate` lets one choose; each change samples anew.
+
+    Parameters
+    ----------
+    model : with ``generate``, ``encoding``, ``starts`` and ``start_names``, as `motionlab.load`
+        gives it. Sliders begin at its ``sampling``, if it has one.
+    seconds, characters : what these two sliders begin at.
+    trail : joints (names, roles or point indices) that leave a trail.
+    color : a method's name or a colour.
+    caption : a text below the player.
+    height : of the picture, pixels.
+
+    Raises
+    ------
+    ViewerError : the model has no states to start from.
+    """
+    if not getattr(model, "start_names", ()):
+        raise ViewerError(
+            "This model has no states to start from; motionlab.load gives it some, or set "
+            "model.starts = model.observe(features) and model.start_names = ('name', ...)."
+        )
+    given = {"seconds": seconds, "characters": characters, **getattr(model, "sampling", {})}
+    fields = {
+        c.name: _field(c, given.get(c.name, c.value), model.start_names)
+        for c in (*CONTROLS, SECONDS)
+    }
+    look = {"trail": trail, "color": palette.check_color(color), "height": height}
+    said = ipywidgets.Label()
+    player = Player(_sampled(model, _values(fields), look), caption=caption or "")
+
+    def sample(_change: Any = None) -> None:
+        begin = time.perf_counter()
+        try:
+            content = _sampled(model, _values(fields), look)
+        except MotionLabError as error:
+            said.value = str(error)
+            return
+        with player.hold_sync():
+            player.frame, player.payload, player.overlay = 0, content, content["overlay"]
+            player.playing = True
+        said.value = f"{content['frames']} frames in {time.perf_counter() - begin:.2f} s"
+
+    for field in fields.values():
+        field.observe(sample, names="value")
+    columns = ipywidgets.Layout(grid_template_columns="repeat(auto-fill, 430px)")
+    return ipywidgets.VBox(
+        [player, ipywidgets.GridBox(list(fields.values()), layout=columns), said]
+    )
+
+
+def _field(control: Control, value: float, starts: Sequence[str]) -> ipywidgets.DOMWidget:
+    """The widget for one control. A slider counts when it is let go: in between it would only make
+    the kernel sample what nobody looks at."""
+    common = {"description": control.label, "tooltip": control.help, "style": _STYLE,
+              "layout": _LAYOUT}  # fmt: skip
+    if control.name == "start":
+        options = [(name, index) for index, name in enumerate(starts)]
+        return ipywidgets.Dropdown(options=options, value=int(value), **common)
+    span = {"min": control.min, "max": control.max, "step": control.step}
+    if control.name == "seed":
+        return ipywidgets.BoundedIntText(value=int(value), **span, **common)
+    whole = all(float(number).is_integer() for number in (*span.values(), value))
+    slider = ipywidgets.IntSlider if whole else ipywidgets.FloatSlider
+    return slider(value=value, continuous_update=False, **span, **common)
+
+
+def _values(fields: dict[str, ipywidgets.DOMWidget]) -> dict[str, Any]:
+    return {name: field.value for name, field in fields.items()}
+
+
+@torch.no_grad()
+def _sampled(model: nn.Module, values: dict[str, Any], look: dict[str, Any]) -> dict[str, Any]:
+    """What the player shows for settings: futures of one start, in one picture."""
+    values = dict(values)
+    frames = max(1, round(values.pop("seconds") * model.fps))
+    start, count = values.pop("start"), values.pop("characters")
+    state = type(model.starts)(*(part[[start] * count] for part in model.starts))
+    chance = torch.Generator(state.frame.device).manual_seed(values.pop("seed"))
+    sampled = model.generate(frames, state, generator=chance, **values)
+    features = torch.cat([state.frame[:, None], sampled], dim=1).cpu()
+    tracks = [_track(model, row, look["color"]) for row in features]
+    return payload(
+        tracks,
+        model.fps,
+        trail=trail_points(look["trail"], tracks),
+        height=look["height"],
+        overlay=count > 1,
+        follow=True,
+        autoplay=True,
+    )
+
+
+def _track(model: nn.Module, features: Tensor, color: str) -> Track:
+    motion = model.encoding.to_motion(features)
+    return Track(motion.positions(), motion.skeleton, "", color, motion.contacts)

@@ -1,0 +1,252 @@
+"""The network that runs in a page: opened from disk, no kernel, no server, no network."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+from tiny_lstm import tiny_lstm
+
+from motionlab import datasets
+from motionlab.encodings import JointAngles, Normalizer
+from motionlab.models import LstmGmm
+from motionlab.viewer.dream import page_figure
+from motionlab.viewer.player import bundle_path
+
+check_book = pytest.importorskip("check_book", exc_type=ImportError)
+sync_api = pytest.importorskip("playwright.sync_api")
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
+<meta name="viewport" content="width=device-width"><title>dream</title>
+<script src="player.js"></script><body style="margin: 8px">{}
+<p style="height: 3000px">text</p><p id="end">end</p></body></html>"""
+
+
+@pytest.fixture(scope="module")
+def clips():
+    names = ("walk_1.2", "run_3.0", "walk_0.8_turn_left_0.5")
+    return [clip for clip in datasets.load("gaits") if clip.name in names]
+
+
+@pytest.fixture(scope="module")
+def model(clips):
+    return tiny_lstm(clips)
+
+
+@pytest.fixture(scope="module")
+def folder(model, tmp_path_factory):
+    """page.html with the network beside it, missing.html without, alone.html that needs nothing."""
+    folder = tmp_path_factory.mktemp("dream")
+    shutil.copy(bundle_path(), folder / "player.js")
+    figure = page_figure(model, seconds=2, height=200, caption="A walker")
+    figure.weights.write(folder / "_static")
+    (folder / "page.html").write_text(PAGE.format(figure.html), encoding="utf-8")
+    broken = figure.html.replace("_static/motionlab-weights", "_static/no-such")
+    (folder / "missing.html").write_text(PAGE.format(broken), encoding="utf-8")
+    figure.save(folder / "alone.html")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser():
+    try:
+        path = check_book.chromium()
+    except SystemExit as missing:
+        pytest.skip(str(missing))
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=check_book.FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(browser, folder, request):
+    """Opens a page of the folder without network; at the end, nothing may have gone wrong."""
+    opened = []
+
+    def visit(name: str = "page.html", **settings) -> check_book.Visit:
+        size = {"width": 700, "height": 800}
+        window = browser.new_context(**{"viewport": size, "offline": True, **settings})
+        opened.append(check_book.Visit(window, (folder / name).as_uri()))
+        return opened[-1]
+
+    yield visit
+    for one in opened:
+        assert one.troubles == []
+        one.page.context.close()
+
+
+def load(page):
+    page.get_by_role("button", name="Load the network").click()
+    page.wait_for_selector("figure[data-live]", timeout=20_000)
+    return page.locator("figure.motionlab-dream")
+
+
+def value(figure, of: str):
+    return figure.evaluate(f"figure => figure.motionlab.{of}")
+
+
+def until(page, expression: str) -> None:
+    page.wait_for_function(
+        f"(() => {{ const figure = document.querySelector('figure').motionlab; return {expression} }})()"
+    )
+
+
+def test_clips_play_until_the_network_is_asked_for(visit):
+    page = (opened := visit()).page
+    figure = page.locator("figure.motionlab-dream")
+    assert value(figure, "player.clock.frames") == 61
+    page.get_by_label("Start").select_option("run_3.0")
+    until(page, "figure.player.payload === figure.clips[1] && figure.player.frame > 3")
+    assert not page.get_by_label("Temperature", exact=True).is_visible()
+    names = lambda: {url.rsplit("/", 1)[1] for url in opened.loaded if "data:" not in url}
+    assert names() == {"page.html", "player.js"}
+    load(page)
+    (script,) = names() - {"page.html", "player.js"}
+    assert script.startswith("motionlab-weights-")
+    assert value(figure, "dreamer.settings.start") == 1  # the start that was chosen
+    until(page, "figure.dreamer.last > 70")  # longer than any clip
+    assert page.get_by_label("Temperature", exact=True).is_visible()
+    assert not page.get_by_role("button", name="Load the network").is_visible()
+    assert "Runs here" in page.locator("p[role=status]").inner_text()
+
+
+def test_its_step_is_that_of_torch(visit, model, clips):
+    rows = model.encoding.encode(clips[1])[20:40]
+    page = visit().page
+    figure = load(page)
+    said = figure.evaluate(
+        """(figure, rows) => {
+          const { dreamer, player } = figure.motionlab;
+          player.pause();
+          dreamer.restart();
+          const [character] = dreamer.characters;
+          return rows.map((row) => {
+            character.input = dreamer.normalize(row);
+            const [mixture] = dreamer.network.step([character]);
+            return ["logWeights", "means", "stds"].map((part) => Array.from(mixture[part]));
+          });
+        }""",
+        rows.tolist(),
+    )
+    state, worst = model.starts[:1], 0.0
+    for row, parts in zip(rows, said, strict=True):
+        mixture, state = model.step(row[None], state)
+        for expected, part in zip(mixture, parts, strict=True):
+            worst = max(worst, np.abs(expected.flatten().numpy() - part).max())
+    assert worst < 0.05  # weights of a byte each; float weights are compared in test_dream.py
+
+
+def test_sliders_act_while_it_plays(visit):
+    page = visit().page
+    figure = load(page)
+    until(page, "figure.dreamer.last > 5")
+    page.get_by_label("Temperature", exact=True).fill("0.3")
+    page.get_by_label("Input noise").fill("0.1")
+    settings = value(figure, "dreamer.settings")
+    assert (settings["temperature"], settings["noise"]) == (0.3, 0.1)
+    assert value(figure, "dreamer.last") > 5  # and it went on
+    page.get_by_label("Characters").fill("3")
+    until(page, "figure.player.casts.length === 3")
+    assert value(figure, "dreamer.tracks[1].first") > 5  # newcomers join
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_label("Seed").fill("5")
+    assert value(figure, "dreamer.last") == 0
+    page.get_by_label("Characters").fill("1")
+    until(page, "figure.player.casts.length === 1")
+    page.get_by_label("Seed").fill("")  # on the way to another number
+    assert value(figure, "dreamer.settings.seed") == 5
+
+
+def test_the_picture_moves_and_keys_work(visit):
+    page = visit().page
+    figure = load(page)
+    canvas = figure.locator("canvas")
+    until(page, "figure.player.frame > 5")
+    before = canvas.screenshot()
+    until(page, "figure.player.frame > 20")
+    assert canvas.screenshot() != before
+    canvas.focus()
+    page.keyboard.press(" ")
+    frame = value(figure, "player.frame")
+    for key, change in {"ArrowRight": 1, "ArrowLeft": 0, "PageUp": -30, "End": 30}.items():
+        page.keyboard.press(key)
+        until(page, f"Math.abs(figure.player.frame - {max(frame + change, 0)}) <= 1")
+    page.keyboard.press("r")
+    assert value(figure, "player.frame") == 0 and value(figure, "dreamer.last") == 0
+
+
+def test_it_rests_where_nobody_looks(visit):
+    page = visit().page
+    figure = load(page)
+    until(page, "figure.dreamer.last > 5")
+    page.locator("#end").scroll_into_view_if_needed()
+    page.wait_for_timeout(400)
+    last = value(figure, "dreamer.last")
+    page.wait_for_timeout(600)
+    assert value(figure, "dreamer.last") == last
+
+
+def test_who_asks_for_calm_starts_it_himself(visit):
+    page = visit(reduced_motion="reduce").page
+    figure = load(page)
+    page.wait_for_timeout(500)
+    assert value(figure, "dreamer.last") == 0
+    page.get_by_role("button", name="Play").click()
+    until(page, "figure.dreamer.last > 5")
+
+
+def test_without_its_weights_the_clips_go_on(browser, folder):
+    window = browser.new_context(offline=True)
+    page = window.new_page()
+    page.goto((folder / "missing.html").as_uri())
+    page.get_by_role("button", name="Load the network").click()
+    status = page.locator("p[role=status]")
+    status.filter(has_text="not beside this page").wait_for()
+    assert page.get_by_role("button", name="Load the network").is_enabled()
+    until(page, "figure.player.frame > 3")
+    window.close()
+
+
+def test_without_scripts_there_is_a_still(browser, folder):
+    window = browser.new_context(java_script_enabled=False)
+    page = window.new_page()
+    page.goto((folder / "page.html").as_uri())
+    assert page.get_by_alt_text("Still picture of a sampled motion").is_visible()
+    window.close()
+
+
+def test_a_saved_page_needs_nothing_else(visit):
+    opened = visit("alone.html")
+    figure = load(opened.page)
+    until(opened.page, "figure.dreamer.last > 5")
+    assert {url.rsplit("/", 1)[1] for url in opened.loaded if "data:" not in url} == {"alone.html"}
+    assert figure.get_by_text("A walker").is_visible()
+
+
+def test_a_phone_shows_all_of_it(visit):
+    opened = visit(viewport={"width": 390, "height": 844})
+    load(opened.page)
+    opened.page.get_by_label("Characters").fill("6")
+    opened.page.get_by_text("Where these weights come from").click()
+    opened.check_width()
+
+
+def test_a_full_network_keeps_up(browser, clips, folder):
+    """512 wide, as shipped: at least 30 frames a second, of one character and of two."""
+    encoding = JointAngles(clips[0].skeleton, 30.0, contacts=True)
+    model = LstmGmm(encoding, Normalizer(encoding.dim)).requires_grad_(False)
+    model.starts, model.start_names = model.zero_state(), ("nothing",)
+    figure = page_figure(model, seconds=0.1, height=200)
+    figure.save(folder / "full.html")
+    window = browser.new_context(offline=True)
+    page = window.new_page()
+    page.goto((folder / "full.html").as_uri())
+    loaded = load(page)
+    page.get_by_role("button", name="Pause").click()
+    for characters in (1, 2):
+        page.get_by_label("Characters").fill(str(characters))
+        assert loaded.evaluate(check_book.FASTEST_STEP) < check_book.STEP
+    window.close()

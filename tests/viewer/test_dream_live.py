@@ -1,0 +1,109 @@
+"""Sliders in a kernel: what they change, and how fast."""
+
+from __future__ import annotations
+
+import time
+
+import ipywidgets
+import pytest
+import torch
+
+from motionlab import datasets
+from motionlab.encodings import JointAngles, Normalizer
+from motionlab.errors import ViewerError
+from motionlab.models import LstmGmm
+from motionlab.viewer.dream_live import controls
+from motionlab.viewer.player import Player
+
+
+@pytest.fixture(scope="module")
+def model():
+    torch.manual_seed(0)
+    clips = [m for m in datasets.load("gaits") if m.name in ("walk_1.2", "run_3.0")]
+    encoding = JointAngles(clips[0].skeleton, contacts=True)
+    rows = [encoding.encode(clip) for clip in clips]
+    model = LstmGmm(encoding, Normalizer.fit(rows), width=32, components=3, skip=0.6)
+    model.eval().requires_grad_(False)
+    model.starts = model.observe(torch.stack([row[:30] for row in rows]))
+    model.start_names = ("walk", "run")
+    model.sampling = {"temperature": 0.5}
+    return model
+
+
+@pytest.fixture
+def box(model):
+    return controls(model, seconds=1)
+
+
+def fields(box) -> dict[str, ipywidgets.Widget]:
+    return {field.description: field for field in box.children[1].children}
+
+
+def player(box) -> Player:
+    return box.children[0]
+
+
+def test_there_is_a_field_for_every_choice_of_generate(box):
+    assert set(fields(box)) == {
+        "Start", "Temperature", "Component temperature", "Input noise", "Characters", "Seed",
+        "Seconds",
+    }  # fmt: skip
+    assert fields(box)["Temperature"].value == 0.5  # as the weights ask for
+    assert player(box).payload["frames"] == 31  # the start itself and a second
+    assert player(box).payload["tracks"][0]["contacts"] is not None
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("Start", 1), ("Temperature", 1.0), ("Component temperature", 0.05), ("Input noise", 0.3),
+     ("Seed", 7)],
+)  # fmt: skip
+def test_a_change_brings_another_motion_and_back_the_same(box, field, value):
+    before, old = player(box).payload, fields(box)[field].value
+    player(box).frame = 9
+    fields(box)[field].value = value
+    after = player(box).payload
+    assert after["tracks"] != before["tracks"]
+    assert player(box).frame == 0 and player(box).playing
+    fields(box)[field].value = old
+    assert player(box).payload == before
+
+
+def test_characters_are_futures_of_one_start_in_one_picture(box):
+    fields(box)["Characters"].value = 3
+    content = player(box).payload
+    assert len({track["local"] for track in content["tracks"]}) == 3
+    assert player(box).overlay
+
+
+def test_seconds_are_seconds(box):
+    fields(box)["Seconds"].value = 4
+    assert player(box).payload["frames"] == 4 * 30 + 1
+
+
+def test_what_cannot_be_shown_is_said_and_the_last_motion_stays(box, model, monkeypatch):
+    before = player(box).payload
+    nan = lambda n, state, **_: torch.full((len(state.frame), n, model.encoding.dim), torch.nan)
+    monkeypatch.setattr(model, "generate", nan)
+    fields(box)["Seed"].value = 3
+    assert "NaN" in box.children[2].value
+    assert player(box).payload == before
+
+
+def test_a_model_without_starts_is_refused(model, monkeypatch):
+    monkeypatch.setattr(model, "start_names", ())
+    with pytest.raises(ViewerError, match=r"model\.starts"):
+        controls(model)
+
+
+def test_all_but_the_network_takes_a_moment(model, monkeypatch):
+    """From slider to motion half a second is allowed; nearly all of it is the network's."""
+    made = model.generate(300, type(model.starts)(*(part[:1] for part in model.starts)))
+    monkeypatch.setattr(model, "generate", lambda n, state, **_: made)
+    box, spent = controls(model, seconds=10), []
+    for seed in range(1, 6):
+        begin = time.process_time()  # others' work on this machine does not count
+        fields(box)["Seed"].value = seed
+        spent.append(time.process_time() - begin)
+    assert player(box).payload["frames"] == 301
+    assert min(spent) < 0.15, spent

@@ -1,0 +1,103 @@
+// Lets a network go on from a start, each frame fed back to get the next, for several characters at
+// once. Settings act on the next frame.
+import { JointAngles } from "./joint_angles.js";
+import { LiveTrack } from "./live_track.js";
+import { LstmGmm } from "./lstm_gmm.js";
+import { Random, sample } from "./mixture.js";
+
+export class Dreamer {
+  /**
+   * `weights` from weights.js; `look` says how the tracks look (bones, extras, color, ...);
+   * `settings`: temperature, component_temperature, noise, start, seed, characters.
+   */
+  constructor(weights, look, settings) {
+    this.network = new LstmGmm(weights.network);
+    this.encoding = new JointAngles(weights.encoding);
+    this.normalizer = weights.normalizer;
+    this.starts = weights.starts;
+    this.fps = weights.fps;
+    this.look = look;
+    this.settings = { ...settings };
+    this.tracks = []; // the same array always: the player keeps it
+    this.restart();
+  }
+
+  /** Begin anew; the same settings give the same motion. */
+  restart() {
+    this.last = 0; // the newest frame
+    this.characters = [];
+    this.tracks.length = 0;
+    this.populate();
+  }
+
+  /** As many characters as the settings say; newcomers begin at the start. */
+  populate() {
+    const count = this.settings.characters;
+    this.characters.length = Math.min(this.characters.length, count);
+    this.tracks.length = this.characters.length;
+    while (this.characters.length < count) this.enter(this.characters.length);
+  }
+
+  enter(number) {
+    const start = this.starts[this.settings.start];
+    const { width } = this.network;
+    const layers = (numbers) => [numbers.slice(0, width), numbers.slice(width)];
+    const character = {
+      input: this.normalize(start.frame),
+      hidden: layers(start.hidden),
+      cell: layers(start.cell),
+      place: { x: 0, z: 0, yaw: 0 },
+      random: new Random(1000 * this.settings.seed + number),
+      track: new LiveTrack(this.encoding.count, this.fps, this.last, this.look),
+    };
+    character.next = this.network.predict(character);
+    this.characters[number] = character;
+    this.tracks[number] = character.track;
+    this.show(character, start.frame);
+  }
+
+  /** One frame more for all characters. */
+  advance() {
+    const { noise } = this.settings;
+    const drawn = this.characters.map(({ next, random }) => sample(next, random, this.settings));
+    this.characters.forEach((character, k) => {
+      character.input = noise ? drawn[k].map((value) => value + noise * character.random.normal()) : drawn[k];
+    });
+    const mixtures = this.network.step(this.characters);
+    this.last++;
+    this.characters.forEach((character, k) => {
+      const row = this.denormalize(drawn[k]);
+      if (!row.every(Number.isFinite)) return this.enter(k); // it has exploded: begin again
+      character.next = mixtures[k];
+      character.place = this.encoding.walk(character.place, row);
+      this.show(character, row);
+    });
+  }
+
+  /** Frames up to `frame`, as far as they can be made in so many milliseconds. */
+  reach(frame, milliseconds = Infinity) {
+    const began = performance.now();
+    const before = this.last;
+    while (this.last < frame && performance.now() - began < milliseconds) this.advance();
+    if (this.last > before) this.cost = 0.9 * (this.cost ?? 5) + (0.1 * (performance.now() - began)) / (this.last - before);
+  }
+
+  show(character, row) {
+    const { track, place } = character;
+    this.encoding.points(row, place, track.room(this.last));
+    track.add(this.last, place, this.encoding.touching(row));
+  }
+
+  normalize(row) {
+    const { kept, mean, std } = this.normalizer;
+    return Float32Array.from(kept, (channel) => (row[channel] - mean[channel]) / std[channel]);
+  }
+
+  /** Channels that never vary are their mean. */
+  denormalize(values) {
+    const { kept, mean, std } = this.normalizer;
+    const row = Float32Array.from(mean);
+    kept.forEach((channel, i) => { row[channel] += values[i] * std[channel]; });
+    return row;
+  }
+}

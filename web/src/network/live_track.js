@@ -1,0 +1,90 @@
+// A motion that is being made: the last seconds of it, with what the player asks of a Track.
+import { addExtras } from "../motion.js";
+
+const KEPT = 20; // seconds that one can go back
+const SMOOTH = 0.35; // seconds: a camera that follows ignores what is quicker
+
+export class LiveTrack {
+  /** `first` is the frame it begins with; `look`: label, color, bones, extras, contactPoints, tall. */
+  constructor(pointCount, fps, first, look) {
+    Object.assign(this, look);
+    Object.assign(this, { pointCount, first, last: first - 1, now: first });
+    this.size = Math.round(KEPT * fps);
+    this.ease = 1 / (SMOOTH * fps);
+    this.frames = Array.from({ length: this.size }, () => null); // {points, contacts, middle}
+    this.points = new Float32Array(3 * (pointCount + this.extras.length));
+  }
+
+  /** Where the points of a frame are to be written. */
+  room(frame) {
+    const slot = (this.frames[frame % this.size] ??= { points: new Float64Array(3 * this.pointCount) });
+    return slot.points;
+  }
+
+  add(frame, { x, z, yaw }, contacts) {
+    const way = [[x, this.way?.[0]], [z, this.way?.[1]]].map(([at, way]) => follow(way, at, this.ease));
+    this.way = way;
+    // smoothing twice lags twice as much: what is between them makes up for it
+    const middle = way.map(([once, twice]) => 2 * once - twice);
+    Object.assign(this.frames[frame % this.size], { contacts, middle, yaw });
+    this.last = frame;
+  }
+
+  get oldest() {
+    return Math.max(this.first, this.last - this.size + 1);
+  }
+
+  at(frame) {
+    return this.frames[Math.min(Math.max(frame, this.oldest), this.last) % this.size];
+  }
+
+  /** Fill `points` (metres) for a time in frames. */
+  seek(time) {
+    const [before, after, mix] = [this.at(Math.floor(time)), this.at(Math.floor(time) + 1), time % 1];
+    this.now = Math.min(Math.max(Math.round(time), this.oldest), this.last);
+    for (let i = 0; i < 3 * this.pointCount; i++) {
+      this.points[i] = before.points[i] + mix * (after.points[i] - before.points[i]);
+    }
+    addExtras(this.points, this.pointCount, this.extras);
+  }
+
+  point(index) {
+    return this.points.subarray(3 * index, 3 * index + 3);
+  }
+
+  touching() {
+    const { contacts } = this.at(this.now);
+    return this.contactPoints.filter((_, bit) => contacts & (1 << bit));
+  }
+
+  top() {
+    return this.tall;
+  }
+
+  /** Smoothed place [x, z] on the floor at a time in frames. */
+  place(time) {
+    const [a, b] = [this.at(Math.floor(time)).middle, this.at(Math.floor(time) + 1).middle];
+    return [0, 1].map((axis) => a[axis] + (time % 1) * (b[axis] - a[axis]));
+  }
+
+  /** Direction on the floor to where it faces now. */
+  heading() {
+    const { yaw } = this.at(this.now);
+    return [Math.sin(yaw), Math.cos(yaw)];
+  }
+
+  /** Put where a point was in the last frames, up to now, into a flat array of x y z; the newest last. */
+  tail(point, line) {
+    const count = line.length / 3;
+    for (let i = 0; i < count; i++) {
+      const { points } = this.at(Math.max(this.now - count + 1 + i, this.oldest));
+      for (let axis = 0; axis < 3; axis++) line[3 * i + axis] = points[3 * point + axis];
+    }
+  }
+}
+
+/** A value smoothed once and twice. */
+function follow([once, twice] = [], value, ease) {
+  const first = once === undefined ? value : once + ease * (value - once);
+  return [first, twice === undefined ? first : twice + ease * (first - twice)];
+}
