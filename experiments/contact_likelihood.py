@@ -40,6 +40,8 @@ def main(arguments: list[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
     plain, contact = motionlab.load(chosen.plain), motionlab.load(chosen.contacts)
+    if plain.about["data"] != contact.about["data"]:  # nor would they count in the same units
+        raise motionlab.MotionLabError("The two generators were trained on different data.")
     data = Prepared.find(chosen.data)
     clips = [clip for clip in data.clips(chosen.split) if len(clip) > 1]
     shared = plain.encoding.dim
@@ -155,4 +157,4 @@ def contacts_given(
 
 
 if __name__ == "__main__":
-    main()
+    record.run(main)

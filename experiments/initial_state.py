@@ -11,12 +11,11 @@ all points, at frame 1 and the frames after it.
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
 import torch
-from record import about_weights, provenance, write
+from record import about_weights, provenance, run, write
 from torch import Tensor, nn
 
 import motionlab
@@ -120,7 +119,4 @@ def _interval(values: Tensor) -> metrics.Interval:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except motionlab.MotionLabError as error:
-        sys.exit(f"initial_state: {error}")
+    run(main)

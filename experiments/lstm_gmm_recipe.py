@@ -94,7 +94,7 @@ class Run:
         data = recipe_data.of(self.row.data)
         model = build(data, self.preset, self.first)
         try:
-            train(model, data, self.preset, self.folder, name=NAME, progress=True)
+            train(model, data, self.preset, self.folder, name=NAME, start=self.first, progress=True)
         except TrainingError as error:
             if "not a number" not in str(error):
                 raise
@@ -127,12 +127,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for run in runs_of(row, base, folder):
                 print(f"{run.made:6} of {run.preset.updates:6}  {run.folder}")
         return
-    tasks = [(row, seed) for row in rows for seed in SEEDS]
-    for row, seed in tasks[part - 1 :: parts]:
-        for run in needed(row, seed, base, folder):
-            if not run.done:
-                print(f"\n{run.folder}: {row.what}", flush=True)
-                run.train()
+    for row in shared(rows, part, parts):
+        for seed in SEEDS:
+            for run in needed(row, seed, base, folder):
+                if not run.done:
+                    print(f"\n{run.folder}: {row.what}", flush=True)
+                    run.train()
     if parts > 1:
         print("this share is done; start without --share once all are, for the result")
         return
@@ -151,6 +151,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 # -- the list of trainings ------------------------------------------------------------------------
+
+
+def shared(rows: Sequence[Row], part: int, parts: int) -> list[Row]:
+    """Rows of one process: no other one needs a training of theirs, be it for a first stage."""
+    families = list(dict.fromkeys(row.first or row.name for row in rows))
+    mine = families[part - 1 :: parts]
+    return [row for row in rows if (row.first or row.name) in mine]
 
 
 def preset_of(row: Row, base: Preset, **more) -> Preset:
@@ -209,13 +216,15 @@ def _slug(name: str) -> str:
 def told(row: Row, base: Preset, folder: Path, starts: int, seconds: float) -> dict:
     """A row of the result."""
     data = recipe_data.of(row.data)
-    lengths = data.lengths[[split == "train" for split in data.splits]].sum()
+    real = [
+        split == "train" and not name.endswith("_mirrored")
+        for split, name in zip(data.splits, data.names, strict=True)
+    ]
     runs = [final(row, seed, base, folder) for seed in SEEDS]
     found = {
         "what": row.what,
         "updates": runs[0].preset.updates,
-        "minutes": float(lengths) / data.encoding.fps / 60,
-        "mirrored": any(name.endswith("_mirrored") for name in data.names),
+        "minutes": float(data.lengths[real].sum()) / data.encoding.fps / 60,
         "runs": [evaluated(run, starts, seconds) for run in runs],
     }
     if row.rates:
@@ -285,4 +294,4 @@ def robustness(model: nn.Module, data: Prepared, starts: int, seconds: float) ->
 
 
 if __name__ == "__main__":
-    main()
+    record.run(main)

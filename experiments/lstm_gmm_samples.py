@@ -290,4 +290,4 @@ def novelty(heads: Tensor, data: Prepared, encoding: Encoding) -> dict:
 
 
 if __name__ == "__main__":
-    main()
+    record.run(main)

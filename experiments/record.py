@@ -1,14 +1,14 @@
-"""What every result says about itself, and how it is written."""
+"""What every result says about itself, how it is written, and how a script is run."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
 import platform
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -16,6 +16,15 @@ import torch
 import motionlab
 from motionlab import metrics
 from motionlab.training import Prepared
+from motionlab.training.checkpoints import write_whole
+
+
+def run(main: Callable[[], None]) -> None:
+    """Run a script's main; what motionlab refuses is a sentence then, not a traceback."""
+    try:
+        main()
+    except motionlab.MotionLabError as error:
+        sys.exit(f"{Path(sys.argv[0]).stem}: {error}")
 
 
 def provenance(begin: float, seed: int, data: Prepared, **more) -> dict:
@@ -36,7 +45,7 @@ def about_weights(model: torch.nn.Module, path: Path) -> dict:
     """What tells these weights from others."""
     return {
         "file": path.name,
-        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "sha256": model.hash,
         "preset": model.about.get("preset"),
         "update": model.about.get("update"),
         "sampling": model.sampling,
@@ -45,10 +54,8 @@ def about_weights(model: torch.nn.Module, path: Path) -> dict:
 
 def write(result: dict, path: str | os.PathLike) -> None:
     """One JSON file; numbers to four digits, what is not finite as null."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(rounded(result), indent=1, allow_nan=False, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    text = json.dumps(rounded(result), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    write_whole(path, lambda stream: stream.write(text.encode()))
     print(path)
 
 

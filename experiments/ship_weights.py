@@ -12,17 +12,19 @@ from __future__ import annotations
 
 import argparse
 import copy
+import hashlib
 import json
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import record
 import temperature
 import torch
 from torch import Tensor, nn
 
 import motionlab
-from motionlab import MotionLabError, contacts, datasets
+from motionlab import MotionLabError, contacts, datasets, weights
 from motionlab.training import PRESETS, Prepared, Preset
 from motionlab.training.checkpoints import load_weights, save_weights, write_whole
 from motionlab.training.evaluation import likelihood
@@ -84,18 +86,21 @@ def main(arguments: list[str] | None = None) -> None:
     print(path.with_suffix(".md").read_text(encoding="utf-8"))
 
 
-def ship(name: str, weights: Path, source: str, folder: Path, sampling: dict[str, float]) -> Path:
+def ship(name: str, file: Path, source: str, folder: Path, sampling: dict[str, float]) -> Path:
     """Write NAME.safetensors and NAME.md; returns the path of the weights."""
     data = Prepared.find(source)
-    model, made = load_weights(weights)
+    model, made = load_weights(file)
     if made["data"] != data.hash:
-        raise MotionLabError(f"{weights}: was not trained on {source}; name the data that it was.")
+        raise MotionLabError(f"{file}: was not trained on {source}; name the data that it was.")
+    licence = licences(data)  # of an unknown source: fails before anything is written
     has_contacts = "contacts" in model.encoding.slices
     clips = (data if has_contacts else data.without_contacts()).clips("val")
     halved = copy.deepcopy(model)
     for parameter in halved.parameters():
         parameter.data = parameter.half().float()
-    sampling = {"temperature": temperature.fit(halved.eval(), clips, **sampling)} | sampling
+    halved.eval()
+    if "temperature" not in sampling:
+        sampling = {"temperature": temperature.fit(halved, clips, **sampling)} | sampling
     starts = choose(candidates(data))
     observed = round(OBSERVED * model.fps)
     with torch.no_grad():  # by the network as it will be
@@ -105,6 +110,7 @@ def ship(name: str, weights: Path, source: str, folder: Path, sampling: dict[str
         halved.generate(2, state, **sampling)  # refuses what makes no sense
     about = {
         **{key: made[key] for key in ("preset", "data", "precision", "update", "seconds")},
+        "start": made.get("start"),
         "name": name,
         "model": made["name"],
         "command": command_of(made, source),
@@ -118,7 +124,7 @@ def ship(name: str, weights: Path, source: str, folder: Path, sampling: dict[str
     }
     path = folder / f"{name}.safetensors"
     save_weights(path, halved, about, starts=state, half=True)
-    text = card(about, halved, path.stat().st_size, data)
+    text = card(about, halved, path.stat().st_size, data.splits.count("train"), *licence)
     write_whole(path.with_suffix(".md"), lambda stream: stream.write(text.encode()))
     return path
 
@@ -187,15 +193,25 @@ def command_of(made: dict, source: str) -> str:
         differ = [key for key, value in asdict(preset).items() if getattr(trained, key) != value]
         if set(differ) <= set(may_differ):
             options = [f"--{key.replace('_', '-')} {getattr(trained, key)}" for key in differ]
+            if made.get("start"):
+                options.insert(0, f"--from {shipped_as(made['start']) or 'WEIGHTS'}")
             command = f"motionlab train {made['name']} --preset {title} --data {source}"
             return " ".join([command, *options])
     raise MotionLabError("No preset of this version has the settings of these weights.")
 
 
-def card(about: dict, model: nn.Module, size: int, data: Prepared) -> str:
-    """The model card, in Markdown."""
+def shipped_as(sha256: str) -> str | None:
+    """Name of the shipped weights of this hash, if there are such."""
+    names = {hashlib.sha256(weights.find(n).read_bytes()).hexdigest(): n for n in weights.names()}
+    return names.get(sha256)
+
+
+def card(
+    about: dict, model: nn.Module, size: int, clips: int, sources: str, commercial: bool
+) -> str:
+    """The model card, in Markdown; clips: for training."""
     full, half = (about["log_likelihood"][kind] for kind in ("full", "half"))
-    sources, commercial = licences(data)
+    begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
     toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
     sampling = ", ".join(f"{key} {value:g}" for key, value in about["sampling"].items())
     parameters = sum(parameter.numel() for parameter in model.parameters())
@@ -219,10 +235,11 @@ motion = model.encoding.to_motion(model.generate(300, model.starts[0])[0])
 | motionlab | {motionlab.__version__}, torch {torch.__version__} |
 | updates | {about["update"]}, the best of validation |
 | seed | {about["preset"]["seed"]} |
+| began with | {begun} |
 | precision of the training | {about["precision"]} |
 | time until then | {about["seconds"] / 3600:.2f} h |
 | data | `{about["data_name"]}`, sha256 {about["data"]} |
-| training clips | {data.splits.count("train")}, half of them mirror images |
+| training clips | {clips}, half of them mirror images |
 | size | {parameters:,} parameters in half precision, {size / 2**20:.1f} MiB |
 | held-out log-likelihood | {half["value"]:.3f} nats a frame [{half["low"]:.3f}, {half["high"]:.3f}] over {half["clips"]} validation clips |
 | what rounding costs | {full["value"] - half["value"]:.4f} nats a frame |
@@ -273,7 +290,4 @@ def licences(data: Prepared) -> tuple[str, bool]:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except MotionLabError as error:
-        sys.exit(f"ship_weights: {error}")
+    record.run(main)

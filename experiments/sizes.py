@@ -66,4 +66,4 @@ def quantised(rows: np.ndarray) -> int:
 
 
 if __name__ == "__main__":
-    main()
+    record.run(main)

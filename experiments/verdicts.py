@@ -145,7 +145,7 @@ BETTER, LEANING, SAME, WORSE = "better", "leaning", "no different", "worse"
 def compare(claimed: Sequence[float], other: Sequence[float], least: float) -> str:
     """How seeds of two rows differ, higher being better: see the rules of W2."""
     difference = sum(claimed) / len(claimed) - sum(other) / len(other)
-    if abs(difference) < least:
+    if math.isnan(difference) or abs(difference) < least:  # NaN: both sides fell apart
         return SAME
     if difference < 0:
         return WORSE
@@ -165,11 +165,19 @@ def seeds(recipe: dict, row: str) -> list[dict]:
     return runs
 
 
+def _fit(run: dict) -> float:
+    """Log-likelihood; a training that fell apart before its first weights has none."""
+    found = run.get("log-likelihood")
+    return -math.inf if found is None else found
+
+
 def _robustness(limits: dict, recipe: dict, claimed: str, other: str) -> Verdict:
     measures = {
-        "seconds until failure": (lambda run: run["seconds until failure"], limits["seconds"]),
+        "seconds until failure": (
+            lambda run: run.get("seconds until failure", 0.0), limits["seconds"]
+        ),
         "liveliness": (
-            lambda run: liveliness(run["acceleration over data"]), limits["liveliness"]
+            lambda run: liveliness(run.get("acceleration over data")), limits["liveliness"]
         ),
     }  # fmt: skip
     return _rows(recipe, claimed, other, measures, _better_and_not_worse)
@@ -207,7 +215,7 @@ def w2_rate(limits: dict, recipe: dict) -> Verdict:
 
 
 def w2_optimiser(limits: dict, recipe: dict) -> Verdict:
-    measures = {"nats a frame": (lambda run: run["log-likelihood"], limits["nats"])}
+    measures = {"nats a frame": (_fit, limits["nats"])}
     verdict, numbers, _ = _rows(recipe, "RMSProp", "SGD", measures, _only)
     edges = []
     for row in ("RMSProp", "SGD"):
@@ -227,9 +235,9 @@ def _only(outcomes: dict[str, str]) -> str:
 
 def w2_pretraining(limits: dict, recipe: dict) -> Verdict:
     measures = {
-        "nats a frame": (lambda run: run["log-likelihood"], limits["nats"]),
+        "nats a frame": (_fit, limits["nats"]),
         "liveliness": (
-            lambda run: liveliness(run["acceleration over data"]), limits["liveliness"]
+            lambda run: liveliness(run.get("acceleration over data")), limits["liveliness"]
         ),
     }  # fmt: skip
     return _rows(recipe, "pretrained", "scratch", measures, _fit_and_not_worse)

@@ -1,8 +1,10 @@
-"""What tests share: real clips, where there are any."""
+"""What tests share: real clips, where there are any, and the scripts of experiments/."""
 
 from __future__ import annotations
 
+import importlib
 import os
+import sys
 import zipfile
 from pathlib import Path
 
@@ -12,6 +14,21 @@ if folder := os.environ.get("MOTIONLAB_DATA"):  # some tests run elsewhere
     os.environ["MOTIONLAB_DATA"] = str(Path(folder).resolve())
 
 SOURCES = ("accad", "aclstm-cmu", "bandai-actions", "bandai-locomotion", "cmu")
+EXPERIMENTS = Path(__file__).parents[1] / "experiments"
+
+
+@pytest.fixture(scope="session")
+def experiment():
+    """Import a script of experiments/ by its name, and with it what it imports from there."""
+
+    def load(name):
+        sys.path.insert(0, str(EXPERIMENTS))
+        try:
+            return importlib.import_module(name)
+        finally:
+            sys.path.remove(str(EXPERIMENTS))
+
+    return load
 
 
 @pytest.fixture(scope="session")

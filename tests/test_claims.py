@@ -257,10 +257,21 @@ def test_edge_of_learning_rates_is_said(verdicts):
     ("a", "b", "said"),
     [((3, 4, 5), (0, 1, 2), "better"), ((3, 4, 5), (0, 1, 3.5), "leaning"),
      ((3, 4, 5), (2.9, 3.9, 4.9), "no different"), ((0, 1, 2), (3, 4, 5), "worse"),
-     ((-1e9, 4, 5), (3, 3, 3), "worse"), ((1, 1, 1), (-float("inf"), 0, 0), "better")],
+     ((-1e9, 4, 5), (3, 3, 3), "worse"), ((1, 1, 1), (-float("inf"), 0, 0), "better"),
+     ((-float("inf"), 0, 0), (-float("inf"), -1, -1), "no different")],
 )  # fmt: skip
 def test_compare(a, b, said, verdicts):
     assert verdicts.compare(a, b, 0.5) == said
+
+
+def test_a_training_that_fell_apart_counts_as_the_worst(verdicts):
+    ruined = {"seed": 0, "fell apart": True}
+    recipe = optimisers((5, 5, 5), (1, 1, 1), "0.001")
+    recipe["rows"]["SGD"]["runs"][0] = ruined
+    assert verdicts.w2_optimiser(claim_of("W2-optimiser")["limits"], recipe).verdict == "reproduced"
+    rows = {"table": {"runs": [ruined] * 3}, "no noise": {"runs": [{
+        "seconds until failure": 9.0, "acceleration over data": 1.1}] * 3}}  # fmt: skip
+    assert verdicts.w2_noise(claim_of("W2-noise")["limits"], {"rows": rows}).verdict == "not"
 
 
 def test_verdicts_are_printed(verdicts, capsys):

@@ -63,6 +63,27 @@ def test_the_data_commands_run(tmp_path):
     assert "Traceback" not in fetch.stderr
 
 
+def test_the_network_s_commands_run(tmp_path, monkeypatch):
+    """Those that need no data, as they stand there; the training shortened to one update."""
+    pytest.importorskip("lightning_fabric")
+    from motionlab import read_bvh, write_bvh
+    from motionlab.__main__ import main
+    from motionlab.datasets import gaits
+
+    commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", README, re.MULTILINE)
+    sample, prepare, train, tune, again = map(str.split, commands)
+    assert (prepare, train[0]) == (["prepare", "locomotion"], "train")  # need data, and hours
+    monkeypatch.chdir(tmp_path)
+    assert main(sample) == 0
+    assert read_bvh("walk.bvh").seconds == 30
+    (tmp_path / "my_clips").mkdir()
+    for speed in range(20):
+        write_bvh(gaits.make(seconds=3, speed=1 + speed / 20), f"my_clips/walk_{speed}.bvh")
+    assert main([*tune, "--updates", "1", "--accelerator", "cpu"]) == 0
+    assert main(again) == 0
+    assert read_bvh("mine.bvh").seconds == 10
+
+
 def test_what_the_readme_links_to_is_there():
     for target in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (ROOT / target).exists(), target

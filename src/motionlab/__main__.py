@@ -212,11 +212,12 @@ class Train:
         data = Prepared.find(self.data)
         if self.model == "lstm-gmm":
             data = data.without_contacts()
-        model = build(data, preset, self.start and find(self.start))
+        start = find(self.start) if self.start else None
+        model = build(data, preset, start)
         out = self.out or Path("runs") / f"{self.model}-{self.preset}"
         curve = train(
-            model, data, preset, out, name=self.model, accelerator=self.accelerator,
-            devices=self.devices, nodes=self.nodes, progress=True,
+            model, data, preset, out, name=self.model, start=start,
+            accelerator=self.accelerator, devices=self.devices, nodes=self.nodes, progress=True,
         )  # fmt: skip
         best = min(curve, key=lambda point: point["val"])
         print(f"{out}: {curve[-1]['update']} updates; best of validation {best['val']:.3f} at "

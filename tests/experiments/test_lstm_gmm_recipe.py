@@ -57,6 +57,18 @@ def test_rows_differ_from_the_table_in_what_they_say(recipe):
         )
 
 
+@pytest.mark.parametrize("parts", [1, 2, 3])
+def test_two_processes_never_train_the_same(recipe, tmp_path, monkeypatch, parts):
+    monkeypatch.setattr(recipe.Run, "validation", 1.0)
+    base, shares = PRESETS["lstm-gmm"]["table"], []
+    for part in range(1, parts + 1):
+        rows = recipe.shared(recipe.ROWS, part, parts)
+        runs = [run for row in rows for seed in recipe.SEEDS
+                for run in recipe.needed(row, seed, base, tmp_path)]  # fmt: skip
+        shares.append({run.folder for run in runs})
+    assert len(set().union(*shares)) == sum(map(len, shares)) == 11 * 3 + 2 * 3
+
+
 def test_list_is_trained_stopped_gone_on_with_and_told(recipe, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(recipe, "SEEDS", (0, 1))
     arguments = ["--preset", "smoke", "--starts", "2", "--seconds", "2", "--output", "found.json"]

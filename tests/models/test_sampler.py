@@ -1,6 +1,7 @@
 """The fast sampler against the loop that can be read, and its rounded weights against whole ones."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -123,6 +124,27 @@ def test_it_follows_weights_that_change(model, start, precision):
     assert not torch.allclose(draw(), before)
     model.lstm.weight_hh_l1.mul_(-1)
     assert torch.equal(draw(), before)
+
+
+@pytest.mark.parametrize("grad", [True, False])
+def test_a_start_follows_the_model(model, start, grad):
+    double = in_double(model)
+    with torch.set_grad_enabled(grad):
+        found = double.generate(5, start, generator=chance())
+        expected = double.generate(5, State(*(part.double() for part in start)), generator=chance())
+    assert found.dtype == torch.float64 and torch.equal(found, expected)
+
+
+def test_a_generator_elsewhere_is_told(model, start):
+    elsewhere = SimpleNamespace(device=torch.device("cuda"))
+    with pytest.raises(ModelError, match="generator is on cuda, the model on cpu; use torch.Gen"):
+        model.generate(2, start, generator=elsewhere)
+
+
+def test_a_start_of_another_encoding_is_told(model, start):
+    other = start._replace(frame=start.frame[:, :-1])
+    with pytest.raises(ModelError, match="no state of this model"):
+        model.generate(2, other)
 
 
 # -- choosing a component -------------------------------------------------------------------------

@@ -28,9 +28,9 @@ def train(gaits):
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
 
-    def run(folder, preset, data=gaits, name="lstm-gmm-contacts", model=None):
+    def run(folder, preset, data=gaits, name="lstm-gmm-contacts", model=None, start=None):
         model = model or build(data, preset)
-        return loop.train(model, data, preset, folder, name=name, accelerator="cpu")
+        return loop.train(model, data, preset, folder, name=name, start=start, accelerator="cpu")
 
     yield run
     torch.set_num_threads(threads)

@@ -1,10 +1,13 @@
 """`motionlab prepare` and `motionlab train`."""
 
 import json
+import re
 
 import pytest
 
+from motionlab import write_bvh
 from motionlab.__main__ import main
+from motionlab.datasets import gaits
 from motionlab.training import checkpoints
 
 
@@ -52,6 +55,15 @@ def test_bad_arguments_are_answered(here, capsys, arguments, said):
     assert main(arguments) == 1
     printed = capsys.readouterr().err
     assert said in printed and "Traceback" not in printed
+
+
+def test_a_folder_of_one_clip_is_too_little(here, capsys):
+    (here / "mine").mkdir()
+    write_bvh(gaits.make(seconds=2), here / "mine" / "walk.bvh")
+    assert main(["train", "lstm-gmm", "--data", "mine"]) == 1
+    said = capsys.readouterr().err
+    assert re.search("mine: has (1 clips for training and 0|0 clips for training and .)", said)
+    assert "Give more clips" in said and not (here / "runs").exists()
 
 
 def test_prepare_into_what_cannot_be_written(here, capsys):

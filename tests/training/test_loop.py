@@ -1,5 +1,6 @@
 """The training loop: it learns, it can be killed, and it notices what does not belong together."""
 
+import hashlib
 import json
 import os
 import random
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
@@ -255,6 +257,39 @@ def test_fine_tuning_begins_with_the_weights(train, smoke, tmp_path, gaits):
     assert curve[0]["val"] == pytest.approx(min(p["val"] for p in first), abs=1e-3)
     with pytest.raises(TrainingError, match="another kind"):
         build(gaits.without_contacts(), smoke(), tmp_path / "first" / "best.safetensors")
+
+
+def test_what_a_training_began_with_is_kept_and_must_be_repeated(train, smoke, tmp_path, gaits):
+    preset, first = smoke(updates=1, decay=0), tmp_path / "first" / "best.safetensors"
+    train(tmp_path / "first", preset)
+    assert checkpoints.load_weights(first)[1]["start"] is None
+    again = lambda start: train(
+        tmp_path / "second", preset, model=build(gaits, preset, start), start=start
+    )
+    again(first)
+    _, about = checkpoints.load_weights(tmp_path / "second" / "best.safetensors")
+    assert about["start"] == hashlib.sha256(first.read_bytes()).hexdigest()
+    again(first)  # the same weights: goes on
+    train(tmp_path / "other", smoke(updates=1, decay=0, seed=1))
+    before = (tmp_path / "second" / "checkpoint.safetensors").read_bytes()
+    for other in (tmp_path / "other" / "best.safetensors", None):
+        with pytest.raises(TrainingError, match="other start .--from.; repeat"):
+            again(other)
+    assert (tmp_path / "second" / "checkpoint.safetensors").read_bytes() == before
+    # a training of a version that did not say began anew
+    tensors, facts = checkpoints.read_checkpoint(tmp_path / "first" / "checkpoint.safetensors")
+    del facts["start"]
+    checkpoints._save(tmp_path / "first" / "checkpoint.safetensors", tensors, facts)
+    train(tmp_path / "first", preset)
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="nothing tells what is mapped")
+def test_what_was_read_does_not_hold_its_file(train, smoke, tmp_path):
+    """Windows refuses to replace a file that is mapped into memory."""
+    train(tmp_path, smoke(updates=1, decay=0))
+    kept = [checkpoints.read_checkpoint(tmp_path / loop.CHECKPOINT)]
+    kept += [checkpoints.load_weights(tmp_path / loop.BEST)]
+    assert str(tmp_path) not in Path("/proc/self/maps").read_text()
 
 
 def test_weights_are_arrays_with_a_header(train, smoke, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import re
 from pathlib import Path
@@ -12,7 +13,8 @@ import torch
 from scipy import stats
 from tiny_lstm import tiny_lstm
 
-from motionlab import MotionLabError, datasets
+import motionlab
+from motionlab import MotionLabError, datasets, weights
 from motionlab.encodings import BodyFrame, JointAngles, Normalizer
 from motionlab.models import LstmGmm
 from motionlab.viewer.body import body
@@ -236,3 +238,17 @@ def test_models_that_it_can_not_run_are_refused(model, clips):
         page_figure(LstmGmm(angles, Normalizer(angles.dim), width=8))
     with pytest.raises(MotionLabError, match="start_names"):
         page_figure(LstmGmm(model.encoding, Normalizer(model.encoding.dim), width=8))
+
+
+@pytest.mark.parametrize("name", weights.names())
+def test_a_slider_can_say_what_suits_the_shipped_weights(name):
+    """Else a browser moves it to the nearest step, and shows another value than the one in use."""
+    controls = {control.name: control for control in CONTROLS}
+    for key, value in motionlab.load(name).sampling.items():
+        control = controls[key]
+        steps = (value - control.min) / control.step
+        assert abs(steps - round(steps)) < 1e-6 and control.min <= value <= control.max
+
+
+def test_the_page_of_a_model_that_has_moved(model):
+    assert len(page_figure(copy.deepcopy(model).double(), seconds=0.5).content["clips"]) == 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 
 import ipywidgets
@@ -51,6 +52,11 @@ def test_there_is_a_field_for_every_choice_of_generate(box):
     assert fields(box)["Temperature"].value == 0.5  # as the weights ask for
     assert player(box).payload["frames"] == 31  # the start itself and a second
     assert player(box).payload["tracks"][0]["contacts"] is not None
+
+
+def test_a_model_may_have_moved_since_it_was_loaded(model, box):
+    moved = controls(copy.deepcopy(model).double(), seconds=1)
+    assert moved.children[0].payload["frames"] == player(box).payload["frames"]
 
 
 @pytest.mark.parametrize(

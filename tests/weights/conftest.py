@@ -1,29 +1,15 @@
 """Tiny weights, trained on gaits in a second and shipped by the script that ships the real ones."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import torch
 
-ROOT = Path(__file__).parents[2]
-
-
-def script(name):
-    """A module of experiments/."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "experiments" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
 
 @pytest.fixture(scope="session")
-def ship_weights():
-    return script("ship_weights")
+def ship_weights(experiment):
+    return experiment("ship_weights")
 
 
 @pytest.fixture(scope="session")

@@ -85,6 +85,12 @@ def test_sample_refuses_and_writes_nothing(here, shipped, capsys, options, said)
     assert not list(here.iterdir())
 
 
+def test_sample_of_weights_that_were_not_shipped(here, trained, capsys):
+    assert main(["sample", str(trained), "--seconds", "1", "--out", "w.bvh"]) == 0
+    assert "from 'mean frame'" in capsys.readouterr().out
+    assert len(motionlab.read_bvh("w.bvh")) == 30
+
+
 def test_sample_looks_at_the_output_first(here, shipped, monkeypatch, capsys):
     def never(*arguments, **options):
         raise AssertionError("sampled first")
@@ -124,8 +130,9 @@ def test_evaluate_prints_and_writes(here, shipped, gaits, capsys):
         model.about["log_likelihood"]["half"]["value"]
     )
     assert found["data"]["jerk (m/s³)"]["low"] > 0
-    assert main([*command[:-1], "none/e.json"]) == 1
-    assert "can't be written to" in capsys.readouterr().err
+    for path, said in [("none/e.json", "can't be written to"), (".", "is a folder")]:
+        assert main([*command[:-1], path]) == 1
+        assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

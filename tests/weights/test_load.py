@@ -135,7 +135,7 @@ def test_shipped_weights_can_be_trained_further(shipped, gaits):
 # -- the card, and what is really shipped ---------------------------------------------------------
 
 
-def test_card_says_what_the_file_holds(model, shipped, ship_weights, gaits):
+def test_card_says_what_the_file_holds(model, shipped, gaits, tmp_path):
     about = model.about
     assert about["command"].startswith("motionlab train lstm-gmm-contacts --preset smoke --data")
     assert about["command"].endswith("--updates 60 --seed 3")
@@ -146,9 +146,17 @@ def test_card_says_what_the_file_holds(model, shipped, ship_weights, gaits):
         "| seed | 3 |", "temperature 0.5", *model.start_names, "allow commercial use", "MIT",
     ):  # fmt: skip
         assert said in model.card, said
-    assert (
-        model.hash in motionlab.load(shutil.copy(shipped, shipped.with_name("b.safetensors"))).hash
-    )
+    assert motionlab.load(shutil.copy(shipped, tmp_path / "b.safetensors")).hash == model.hash
+
+
+def test_card_says_what_a_training_began_with(model, shipped, ship_weights, monkeypatch):
+    assert "| began with | chance |" in model.card
+    made = {**model.about, "name": "lstm-gmm-contacts", "start": model.hash}
+    assert " --from WEIGHTS --updates 60" in ship_weights.command_of(made, "gaits")
+    monkeypatch.setattr(weights, "_FOLDER", shipped.parent)
+    assert " --from tiny --updates 60" in ship_weights.command_of(made, "gaits")
+    card = ship_weights.card({**model.about, "start": model.hash}, model, 9, 9, "", True)
+    assert f"| began with | weights of sha256 {model.hash} |" in card
 
 
 def test_other_data_than_those_of_the_training_are_refused(ship_weights, trained, gaits, tmp_path):

@@ -49,7 +49,7 @@ class Evaluate:
 
         begin = time.perf_counter()
         if self.out is not None:
-            check_writable(self.out.parent)
+            check_writable(self.out)
         model, data = load(self.model), Prepared.find(self.data)
         sampling = model.sampling | given(self)
         found = evaluate(

@@ -47,8 +47,8 @@ class Sample:
         model = load(self.model)
         paths, frames = self._paths(), self._frames(model.fps)
         chosen = self._starts(model.start_names)
-        for folder in {path.parent for path in paths}:
-            check_writable(folder)
+        for path in paths:
+            check_writable(path)
         sampling = model.sampling | given(self)
         if frames * len(paths) >= LONG:
             print(f"{frames * len(paths)} frames; this takes a while", flush=True)
@@ -89,9 +89,6 @@ class Sample:
         else:
             numbers = range(1, self.characters + 1)
             paths = [self.out.with_stem(f"{self.out.stem}_{number}") for number in numbers]
-        for path in paths:
-            if path.is_dir():
-                raise MotionLabError(f"--out {path}: is a folder; name a file.")
         return paths
 
     def _starts(self, names: tuple[str, ...]) -> list[int]:
@@ -113,10 +110,12 @@ def given(command: object) -> dict[str, float]:
     return {key: getattr(command, key) for key in keys if getattr(command, key) is not None}
 
 
-def check_writable(folder: Path) -> None:
-    """Before long work: raise TrainingError if no file can be made in a folder."""
+def check_writable(path: Path) -> None:
+    """Before long work: raise TrainingError if no file can be made there."""
+    if path.is_dir():
+        raise TrainingError(f"{path}: is a folder; name a file.")
     try:
-        with tempfile.TemporaryFile(dir=os.fspath(folder)):
+        with tempfile.TemporaryFile(dir=os.fspath(path.parent)):
             pass
     except OSError as error:
-        raise TrainingError(f"{folder}: can't be written to ({error.strerror}).") from error
+        raise TrainingError(f"{path.parent}: can't be written to ({error.strerror}).") from error

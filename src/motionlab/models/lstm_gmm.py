@@ -235,7 +235,8 @@ class LstmGmm(nn.Module):
         Parameters
         ----------
         n : frames.
-        start : from `observe`; the batch is as large as it.
+        start : from `observe`; the batch is as large as it. Brought to the model's device and
+            precision.
         generator : source of chance, on the model's device.
         temperature : factor on the standard deviations; 1 is what was learned, less is calmer.
         component_temperature : the same for the choice among the M components.
@@ -249,8 +250,8 @@ class LstmGmm(nn.Module):
         Raises
         ------
         ModelError : n is not a whole number above zero, a temperature is not above zero, the noise
-            is negative, the state is another model's or holds a NaN, or the precision is none of
-            the three or not possible here.
+            is negative, the state is another model's or holds a NaN, the generator is on another
+            device, or the precision is none of the three or not possible here.
         """
         if not isinstance(n, Integral) or n < 1:
             raise ModelError(f"generate: {n!r} frames; ask for 1 or more.")
@@ -260,12 +261,20 @@ class LstmGmm(nn.Module):
                 raise ModelError(f"generate: {what} is {value!r}; it must be a number above 0.")
         if not isinstance(noise, Real) or not 0 <= noise < math.inf:
             raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")
-        if not isinstance(start, State) or start.hidden.shape[1:] != (2, self.width):
+        shapes = (self.encoding.dim,), (2, self.width), (2, self.width)
+        if not isinstance(start, State) or tuple(part.shape[1:] for part in start) != shapes:
             raise ModelError("generate: start is no state of this model; `observe` gives one.")
         if not all(part.isfinite().all() for part in start):
             raise ModelError("generate: start holds a NaN or infinite value.")
         if precision not in PRECISIONS:
             raise ModelError(f"generate: precision {precision!r}; it is one of {[*PRECISIONS]}.")
+        like = self.normalizer.mean
+        if generator is not None and generator.device.type != like.device.type:
+            raise ModelError(
+                f"generate: the generator is on {generator.device.type}, the model on "
+                f"{like.device.type}; use torch.Generator({like.device.type!r})."
+            )
+        start = State(*(part.to(like) for part in start))
         chance = generator, temperature, component_temperature
         if not torch.is_grad_enabled():
             return unroll(self, n, start, *chance, noise, precision)

@@ -143,7 +143,10 @@ def _load(path: str | os.PathLike) -> tuple[dict[str, Tensor], dict]:
     try:
         with safetensors.safe_open(path, framework="pt") as file:
             header = json.loads((file.metadata() or {})["motionlab"])
-            return {name: file.get_tensor(name) for name in file.keys()}, header  # noqa: SIM118
+            # Copies: a tensor that lies in the file keeps it open, and Windows then refuses to put
+            # a newer file in its place.
+            tensors = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+        return tensors, header
     except FileNotFoundError as error:
         raise TrainingError(f"{path}: there is no such file.") from error
     except (OSError, KeyError, ValueError, safetensors.SafetensorError) as error:

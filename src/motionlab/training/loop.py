@@ -7,6 +7,7 @@ several processes, each of which takes its share of the same batch.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import statistics
@@ -43,6 +44,7 @@ def train(
     folder: str | os.PathLike,
     *,
     name: str,
+    start: str | os.PathLike | None = None,
     accelerator: str = "auto",
     devices: int = 1,
     nodes: int = 1,
@@ -57,6 +59,8 @@ def train(
     folder : receives ``checkpoint.safetensors`` (to go on from), ``best.safetensors`` (weights with
         the lowest validation loss) and ``curve.json`` at every validation.
     name : of the model, kept with its weights.
+    start : file of the weights that the model begins with, as `build` was given it; None if it
+        begins anew. Its sha256 is kept with the weights.
     accelerator, devices, nodes, precision : as for Lightning Fabric; by default one device, the
         best there is, in bfloat16 on a GPU and in float32 elsewhere.
     progress : show a bar and a line for every validation.
@@ -91,7 +95,8 @@ def train(
     network.mark_forward_method("loss")
     facts = {
         "name": name, "model": model.config(), "preset": asdict(preset), "data": data.hash,
-        "precision": precision, "update": 0, "seconds": 0.0, "curve": [],
+        "precision": precision, "start": start and _sha256(start), "update": 0, "seconds": 0.0,
+        "curve": [],
     }  # fmt: skip
     _resume(fabric, Path(folder), model, optimizer, facts)
 
@@ -200,6 +205,7 @@ def _check_same(path: Path, found: dict, wanted: dict) -> None:
         update = found["update"]
         was, now = (
             {key: facts[key] for key in ("name", "model", "data", "precision")}
+            | {"start (--from)": facts.get("start")}
             | asdict(replace(preset, **dict.fromkeys(_MAY_CHANGE, 1)))
             for facts, preset in ((found, before), (wanted, after))
         )
@@ -217,6 +223,10 @@ def _check_same(path: Path, found: dict, wanted: dict) -> None:
             f"updates in all ask for. A training can be given another end only before its learning "
             f"rate falls, the last {after.decay} updates; start a new one from its weights instead."
         )
+
+
+def _sha256(path: str | os.PathLike) -> str:
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def _not_a_number(update: int, loss: Tensor, preset: Preset, facts: dict, folder: Path) -> str:

@@ -158,8 +158,9 @@ def prepare(
     training = [clip for clip, split in zip(features, splits, strict=True) if split == "train"]
     if not training or "val" not in splits:
         raise DataError(
-            f"{source}: has {len(training)} clips for training and {splits.count('val')} for "
-            "validation; there must be some of both."
+            f"{source}: has {len(training) // 2} clips for training and {splits.count('val')} for "
+            "validation; there must be some of both. Which is for what depends on their names: "
+            "about one in ten is for validation. Give more clips."
         )
     rows, lengths = torch.cat(features), torch.tensor([len(clip) for clip in features])
     normalizer = Normalizer.fit(training)

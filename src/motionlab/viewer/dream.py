@@ -48,7 +48,7 @@ class Control:
 CONTROLS = (
     Control("start", "Start", "What the body was doing before the network took over", 0, 0, 1, 0),
     Control("temperature", "Temperature", "Factor on the standard deviations: 1 is what was "
-            "learned, less is calmer", 0.05, 2, 0.05, 1),
+            "learned, less is calmer", 0.05, 2, 0.01, 1),
     Control("component_temperature", "Component temperature", "Near 0 the likeliest component "
             "always wins; 1 is what was learned", 0.05, 2, 0.05, 1),
     Control("noise", "Input noise", "Standard deviation of what is added to all that the network "
@@ -213,10 +213,10 @@ def _check(model: nn.Module) -> None:
 @torch.no_grad()
 def _clips(model: nn.Module, frames: int, color: str) -> list[Track]:
     """One motion from each start, sampled as the sliders stand at first."""
-    chance = torch.Generator().manual_seed(0)
+    chance = torch.Generator(next(model.parameters()).device).manual_seed(0)
     sampling = getattr(model, "sampling", {})
     sampled = model.generate(frames, model.starts, generator=chance, **sampling)
-    features = torch.cat([model.starts.frame[:, None], sampled], dim=1)
+    features = torch.cat([model.starts.frame[:, None].to(sampled), sampled], dim=1).cpu()
     motions = [model.encoding.to_motion(row) for row in features]
     skeleton = model.encoding.skeleton
     return [Track(m.positions(), skeleton, "", color, m.contacts) for m in motions]

@@ -113,10 +113,10 @@ def _sampled(model: nn.Module, values: dict[str, Any], look: dict[str, Any]) -> 
     values = dict(values)
     frames = max(1, round(values.pop("seconds") * model.fps))
     start, count = values.pop("start"), values.pop("characters")
-    state = type(model.starts)(*(part[[start] * count] for part in model.starts))
-    chance = torch.Generator(state.frame.device).manual_seed(values.pop("seed"))
+    state = model.starts[[start] * count]
+    chance = torch.Generator(next(model.parameters()).device).manual_seed(values.pop("seed"))
     sampled = model.generate(frames, state, generator=chance, **values)
-    features = torch.cat([state.frame[:, None], sampled], dim=1).cpu()
+    features = torch.cat([state.frame[:, None].to(sampled), sampled], dim=1).cpu()
     tracks = [_track(model, row, look["color"]) for row in features]
     return payload(
         tracks,

@@ -42,22 +42,21 @@ def find(name_or_path: str | os.PathLike) -> Path:
 def load(name_or_path: str | os.PathLike) -> nn.Module:
     """A trained model, ready to generate: on the CPU, in float32, in eval mode.
 
+    Its parameters ask for no gradients, so that `generate` remembers nothing. It comes with
+
+    * `starts`, a batch of states to begin from: ``starts[2]``, ``starts[:4]``. Weights that were not
+      shipped have a single one: that of a network which has seen the mean frame.
+    * `start_names`, what the body does in each of them, such as "walk 1.2 m/s".
+    * `sampling`, arguments of `generate` that suit these weights best.
+    * `hash`, sha256 of the file; `about`, how they were made; `card`, the same as Markdown.
+
     Parameters
     ----------
     name_or_path : one of `names()`, or a file such as the best.safetensors of a training.
 
     Returns
     -------
-    nn.Module : such as `models.LstmGmm`, and with it
-
-        * `starts`, a batch of states to begin from: ``starts[2]``, ``starts[:4]``. Weights that were
-          not shipped have a single one: that of a network which has seen the mean frame.
-        * `start_names`, what the body does in each of them, such as "walk 1.2 m/s".
-        * `sampling`, arguments of `generate` that suit these weights best.
-        * `hash`, sha256 of the file; `about`, how they were made; `card`, the same as text
-          (Markdown; that of ``x.safetensors`` is ``x.md``, empty if there is none).
-
-        Its parameters ask for no gradients, so that `generate` remembers nothing.
+    nn.Module : such as `models.LstmGmm`, with what is listed above.
 
     Raises
     ------
