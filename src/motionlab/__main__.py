@@ -155,6 +155,10 @@ class Prepare:
     """Data set, as `data list` names it, or a folder of BVH files."""
     permissive: bool = False
     """Leave out clips whose licence forbids commercial use."""
+    units: str | None = None
+    """Of a folder's files: m, cm, mm, in, ft, or metres per unit; cm if left out."""
+    skip_bad: bool = False
+    """Leave out a folder's files that can't be read."""
     out: Path | None = None
     """File to write; runs/NAME.npz, or runs/NAME-permissive.npz, if left out."""
 
@@ -163,7 +167,9 @@ class Prepare:
         from .training.prepared import file_of
 
         out = self.out or file_of(self.source, self.permissive)
-        prepared = prepare(self.source, progress=True, permissive=self.permissive)
+        reading = {"units": _number_or(self.units)} if self.units is not None else {}
+        reading |= {"skip_bad": True} if self.skip_bad else {}
+        prepared = prepare(self.source, progress=True, permissive=self.permissive, **reading)
         prepared.save(out)
         print(f"{out}: {len(prepared.names)} clips, {len(prepared.features)} frames, "
               f"hash {prepared.hash[:12]}")  # fmt: skip
@@ -233,6 +239,13 @@ COMMANDS = (
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Version, subcommand("version")]
 )
+
+
+def _number_or(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _confirm() -> None:

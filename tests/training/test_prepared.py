@@ -142,3 +142,25 @@ def test_permissive_data_may_be_used_commercially(real_clips, monkeypatch, tmp_p
 def test_of_a_folder_nobody_knows_the_licences(tmp_path):
     with pytest.raises(DataError, match="licences"):
         prepare(tmp_path, permissive=True)
+
+
+@pytest.mark.parametrize("units", ["m", "1"])
+def test_a_folder_in_other_units_with_a_bad_file(tmp_path, monkeypatch, capsys, units):
+    for name, unit in (("centimetres", "cm"), ("metres", "m")):
+        for i, motion in enumerate(datasets.load("gaits", "val") + datasets.load("gaits", "test")):
+            (tmp_path / name).mkdir(exist_ok=True)
+            write_bvh(motion[:40], tmp_path / name / f"{i}.bvh", units=unit)
+    (tmp_path / "metres" / "bad.bvh").write_text("no motion")
+    monkeypatch.chdir(tmp_path)
+    assert main(["prepare", "metres", "--units", units]) == 1
+    assert "bad.bvh" in capsys.readouterr().err and not Path("runs").exists()
+    with pytest.warns(UserWarning, match=r"bad\.bvh"):
+        assert main(["prepare", "metres", "--units", units, "--skip-bad"]) == 0
+    assert main(["prepare", "centimetres"]) == 0
+    metres, centimetres = (Prepared.load(f"runs/{name}.npz") for name in ("metres", "centimetres"))
+    torch.testing.assert_close(metres.features, centimetres.features, atol=1e-5, rtol=0)
+
+
+def test_how_named_data_are_read_is_no_question():
+    with pytest.raises(DataError, match="leave out units"):
+        prepare("gaits", units="m")

@@ -127,7 +127,11 @@ def file_of(source: str | os.PathLike, permissive: bool = False) -> Path:
 
 
 def prepare(
-    source: str | os.PathLike, progress: bool = False, *, permissive: bool = False
+    source: str | os.PathLike,
+    progress: bool = False,
+    *,
+    permissive: bool = False,
+    **reading,
 ) -> Prepared:
     """Load, bring to the canonical skeleton at 30 frames per second, encode.
 
@@ -136,6 +140,7 @@ def prepare(
     source : the name of a data set, or a folder of BVH files.
     progress : show how far it is.
     permissive : leave out clips whose licence forbids commercial use (of a data set).
+    reading : how to read a folder's files, such as `units`; see `datasets.from_folder`.
 
     Training clips are used twice, the second time mirrored. Rows are those of `JointAngles` with
     contacts; see `Prepared.without_contacts`.
@@ -149,7 +154,7 @@ def prepare(
     encoding = JointAngles(Skeleton.canonical(), fps=FPS, contacts=True)
     features, names, splits = [], [], []
     for split in SPLITS:
-        motions = _load(source, split, permissive)
+        motions = _load(source, split, permissive, reading)
         bar = tqdm(motions, f"encoding {split}", leave=False, unit="clip", disable=not progress)
         for motion in bar:
             features.append(encoding.encode(motion))
@@ -168,16 +173,20 @@ def prepare(
     return Prepared(rows, lengths, tuple(names), tuple(splits), encoding, normalizer, digest)
 
 
-def _load(source: str | os.PathLike, split: str, permissive: bool) -> list[Motion]:
+def _load(source: str | os.PathLike, split: str, permissive: bool, reading: dict) -> list[Motion]:
     """Canonical clips of a split, in training with their mirror images."""
     if str(source) in datasets.names():
+        if reading:
+            raise DataError(
+                f"{source}: how its files are read is known; leave out {', '.join(reading)}."
+            )
         motions = datasets.load(source, split, permissive=permissive)
     elif permissive:
         raise DataError(
             f"{source}: licences are known of named data sets only, not of a folder's clips."
         )
     else:
-        motions = datasets.from_folder(source, split=split)
+        motions = datasets.from_folder(source, split=split, **reading)
     motions = [motion.resample(FPS).retarget() for motion in motions]
     if split == "train":
         motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
