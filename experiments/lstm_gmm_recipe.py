@@ -25,9 +25,10 @@ import record
 import rollouts
 from torch import nn
 
+from motionlab.errors import DivergedError
 from motionlab.training import PRESETS, Prepared, Preset, build
 from motionlab.training.checkpoints import load_weights, write_whole
-from motionlab.training.evaluation import likelihood, starting_windows
+from motionlab.training.evaluation import likelihood, measured, over_all, starting_windows
 
 NAME = "lstm-gmm"
 SEEDS = (0, 1, 2)
@@ -88,16 +89,13 @@ class Run:
 
     def train(self) -> None:
         """Train, or go on; a training that falls apart counts as done with what it has."""
-        from motionlab.errors import TrainingError
         from motionlab.training.loop import train
 
         data = recipe_data.of(self.row.data)
         model = build(data, self.preset, self.first)
         try:
             train(model, data, self.preset, self.folder, name=NAME, start=self.first, progress=True)
-        except TrainingError as error:
-            if "not a number" not in str(error):
-                raise
+        except DivergedError as error:
             (self.folder / "failed.txt").write_text(str(error), encoding="utf-8")
 
     @property
@@ -258,11 +256,11 @@ def evaluated(run: Run, starts: int, seconds: float) -> dict:
 def _judged(data_name: str) -> tuple[rollouts.Judge, float]:
     """The judge of some data, and the mean acceleration of the clips that rollouts begin in."""
     data = recipe_data.of(data_name)
-    judge, _ = rollouts.judge_of(data)
+    judge = rollouts.judge_of(data)
     clips = [data.encoding.positions(clip) for clip in data.clips("test")]
     clips = [clip for clip in clips if len(clip) >= rollouts.OBSERVED * data.encoding.fps]
-    each = [rollouts.measured(p, data.encoding.skeleton, data.encoding.fps) for p in clips]
-    return judge, rollouts.of_all(each, list(map(len, clips)))["acceleration (m/s²)"].value
+    each = [measured(p, data.encoding.skeleton, data.encoding.fps) for p in clips]
+    return judge, over_all(each, list(map(len, clips)))["acceleration (m/s²)"].value
 
 
 def robustness(model: nn.Module, data: Prepared, starts: int, seconds: float) -> dict:
@@ -279,11 +277,11 @@ def robustness(model: nn.Module, data: Prepared, starts: int, seconds: float) ->
             lasted.append(min(seconds, *failures.values()))
             sound = points[: round(lasted[-1] * fps)]
             if len(sound) >= fps:
-                lively.append((rollouts.measured(sound, skeleton, fps), len(sound)))
+                lively.append((measured(sound, skeleton, fps), len(sound)))
     means = {}
     if lively:
         each, frames = zip(*lively, strict=True)
-        means = {key: found.value for key, found in rollouts.of_all(each, frames).items()}
+        means = {key: found.value for key, found in over_all(each, frames).items()}
     return {
         "starts": len(lasted),
         "seconds until failure": float(np.mean(lasted)),

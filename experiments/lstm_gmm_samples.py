@@ -27,6 +27,7 @@ from motionlab.datasets.registry import choose
 from motionlab.encodings import BodyFrame, Encoding, Normalizer
 from motionlab.training import Prepared
 from motionlab.training.checkpoints import write_whole
+from motionlab.training.evaluation import measured, over_all
 from motionlab.weights import find
 
 SAMPLES, AFTER = 100, 5.0  # from one start; seconds after which it is forgotten
@@ -57,7 +58,7 @@ def main(arguments: list[str] | None = None) -> None:
     data = full = Prepared.find(chosen.data)
     if "contacts" not in model.encoding.slices:
         data = full.without_contacts()
-    judge, _ = rollouts.judge_of(data)
+    judge = rollouts.judge_of(data)
     seen = round(OBSERVED * model.fps)
     clips = [clip for clip in data.clips("test") if len(clip) >= seen]
     clips = [clips[i] for i in rollouts.spread_evenly(len(clips), chosen.starts)]
@@ -249,12 +250,12 @@ def likeness(
     heads: Tensor, rows: list[dict], alive: list[bool], clips: list[Tensor], encoding: Encoding
 ) -> dict:
     """First minutes beside the clips they began in, one of each, so that as many walk and run."""
-    measure = lambda points: rollouts.measured(points, encoding.skeleton, encoding.fps)
-    data = rollouts.of_all([measure(encoding.positions(clip)) for clip in clips], [1] * len(clips))
+    measure = lambda points: measured(points, encoding.skeleton, encoding.fps)
+    data = over_all([measure(encoding.positions(clip)) for clip in clips], [1] * len(clips))
     found = {"failed in the first minute": 1 - sum(alive) / len(rows), "data": data}
     kept = [measure(encoding.positions(head)) for head, ok in zip(heads, alive, strict=True) if ok]
     if kept:
-        samples = rollouts.of_all(kept, [1] * len(kept))
+        samples = over_all(kept, [1] * len(kept))
         ratios = {key: samples[key].value / data[key].value for key in samples}
         found |= {"samples": samples, "samples over data": ratios}
     return found

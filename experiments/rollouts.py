@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import max_pool1d
 
-from motionlab import Skeleton, contacts, metrics
+from motionlab import Skeleton, metrics
 from motionlab.encodings import Encoding
 from motionlab.training import Prepared
 
@@ -69,14 +69,14 @@ def _held(positions: Tensor, skeleton: Skeleton, fps: float) -> tuple[Tensor, Te
     return -pool(-lowest), pool(lowest)
 
 
-def judge_of(data: Prepared) -> tuple[Judge, list[Tensor]]:
-    """The judge made of the training clips, mirror images left out, and their positions."""
+def judge_of(data: Prepared) -> Judge:
+    """The judge made of the training clips, mirror images left out."""
     encoding = data.encoding
     clips = [encoding.positions(clip) for clip in data.clips("train")]
     names = [n for n, split in zip(data.names, data.splits, strict=True) if split == "train"]
     clips = [clip for clip, n in zip(clips, names, strict=True) if not n.endswith("_mirrored")]
     clips = [clip for clip in clips if len(clip) >= WHOLE * encoding.fps]
-    return Judge.fit(clips, encoding.skeleton, encoding.fps), clips
+    return Judge.fit(clips, encoding.skeleton, encoding.fps)
 
 
 def spread_evenly(count: int, wanted: int) -> list[int]:
@@ -107,27 +107,3 @@ def points_of(encoding: Encoding, features: Tensor) -> Tensor:
     positions = encoding.positions(features.nan_to_num(0.0, 0.0, 0.0))
     bad = ~features.isfinite().all(-1)
     return positions.masked_fill((bad.cumsum(-1) > 0)[:, None, None], torch.nan)
-
-
-def measured(positions: Tensor, skeleton: Skeleton, fps: float) -> dict[str, float]:
-    """Means over one finite motion."""
-    down = contacts.label_positions(positions, skeleton, fps)
-    return {
-        "speed (m/s)": float(metrics.speed(positions, fps).mean()),
-        "acceleration (m/s²)": float(metrics.acceleration(positions, fps)),
-        "jerk (m/s³)": float(metrics.jerk(positions, fps)),
-        "foot skate (cm/s)": float(metrics.foot_skate(positions, down, skeleton, fps)),
-        "foot skate, weighted (cm/s)": float(metrics.foot_skate_weighted(positions, skeleton, fps)),
-    }
-
-
-def of_all(values: Sequence[dict[str, float]], frames: Sequence[int]) -> dict:
-    """Means over all frames of some motions, with intervals over motions; those of finite values."""
-    found = {}
-    for key in values[0]:
-        pairs = [(v[key], n) for v, n in zip(values, frames, strict=True) if math.isfinite(v[key])]
-        if pairs:  # feet that never rest have no skate
-            found[key] = metrics.bootstrap(
-                pairs, lambda some: sum(v * n for v, n in some) / sum(n for _, n in some)
-            )
-    return found

@@ -6,12 +6,13 @@ tremble. Lower temperatures are calmer, and too low ones calmer than people.
 
 from __future__ import annotations
 
+import rollouts
 import torch
 from torch import Tensor, nn
 
 from motionlab import metrics
 
-OBSERVED, SECONDS = 2.0, 20.0
+SECONDS = 20.0
 LEAST, MOST, HALVINGS = 0.1, 1.0, 6  # known to 0.014 then
 
 
@@ -22,7 +23,7 @@ def fit(model: nn.Module, clips: list[Tensor], seed: int = 0, **sampling: float)
     Each clip (frames, dim) of two seconds or more gives one sample of 20 s. Between 0.1 and 1, of
     which it is the nearer end if no temperature does.
     """
-    seen = round(OBSERVED * model.fps)
+    seen = round(rollouts.OBSERVED * model.fps)
     clips = [clip for clip in clips if len(clip) >= seen]
     start = model.observe(torch.stack([clip[:seen] for clip in clips]))
     wanted = torch.stack([_acceleration(model, clip) for clip in clips]).mean()

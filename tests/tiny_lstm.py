@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import torch
 
-from motionlab import Motion
+from motionlab import Motion, datasets
 from motionlab.encodings import JointAngles, Normalizer
 from motionlab.models import LstmGmm
+
+
+def tiny_clips(*names: str) -> list[Motion]:
+    """Gaits by their names."""
+    return [clip for clip in datasets.load("gaits") if clip.name in names]
 
 
 def tiny_lstm(clips: list[Motion], width: int = 30, updates: int = 30) -> LstmGmm:

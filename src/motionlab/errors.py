@@ -47,3 +47,7 @@ class ModelError(MotionLabError):
 
 class TrainingError(MotionLabError):
     """A training that can't start, can't go on where it was, or has gone wrong."""
+
+
+class DivergedError(TrainingError):
+    """A training whose loss or gradient is no longer a number."""

@@ -6,16 +6,14 @@ import shutil
 
 import numpy as np
 import pytest
-from tiny_lstm import tiny_lstm
+from tiny_lstm import tiny_clips, tiny_lstm
 
-from motionlab import datasets
 from motionlab.encodings import JointAngles, Normalizer
 from motionlab.models import LstmGmm
 from motionlab.viewer.dream import page_figure
 from motionlab.viewer.player import bundle_path
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
-sync_api = pytest.importorskip("playwright.sync_api")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
@@ -26,8 +24,7 @@ PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
 
 @pytest.fixture(scope="module")
 def clips():
-    names = ("walk_1.2", "run_3.0", "walk_0.8_turn_left_0.5")
-    return [clip for clip in datasets.load("gaits") if clip.name in names]
+    return tiny_clips("walk_1.2", "run_3.0", "walk_0.8_turn_left_0.5")
 
 
 @pytest.fixture(scope="module")
@@ -47,18 +44,6 @@ def folder(model, tmp_path_factory):
     (folder / "missing.html").write_text(PAGE.format(broken), encoding="utf-8")
     figure.save(folder / "alone.html")
     return folder
-
-
-@pytest.fixture(scope="module")
-def browser():
-    try:
-        path = check_book.chromium()
-    except SystemExit as missing:
-        pytest.skip(str(missing))
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=check_book.FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -14,7 +14,6 @@ from motionlab.viewer.player import bundle_path
 from motionlab.viewer.show import show
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
-sync_api = pytest.importorskip("playwright.sync_api")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
@@ -52,18 +51,6 @@ def page_file(tmp_path_factory):
     html = PAGE.format("<p>text</p>".join(figure.html for figure in figures))
     (folder / "page.html").write_text(html, encoding="utf-8")
     return folder / "page.html"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    try:
-        path = check_book.chromium()
-    except SystemExit as missing:
-        pytest.skip(str(missing))
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=check_book.FLAGS)
-        yield browser
-        browser.close()
 
 
 @contextmanager

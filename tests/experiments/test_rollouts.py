@@ -89,11 +89,3 @@ def test_batches_left_out_change_nothing_in_the_others(rollouts, monkeypatch):
     assert [len(batch) for batch in whole.values()] == [3, 3, 1]
     rest = dict(rollouts.sampled(Chance(), begun, 10, seed=3, done=[1]))
     assert list(rest) == [0, 2] and torch.equal(rest[2], whole[2])
-
-
-def test_means_are_over_frames_and_leave_out_what_is_not_defined(rollouts):
-    values = [{"a": 1.0, "b": math.nan}, {"a": 4.0, "b": 2.0}, {"a": 4.0, "b": math.nan}]
-    found = rollouts.of_all(values, [10, 20, 30])
-    assert found["a"].value == pytest.approx((10 + 80 + 120) / 60)
-    assert found["b"].value == 2.0 and found["b"].clips == 1
-    assert "c" not in rollouts.of_all([{"c": math.nan, "a": 1.0}], [1])

@@ -318,12 +318,6 @@ def test_a_share_is_between_nothing_and_all(clips, skip):
         LstmGmm(clips[0], Normalizer(clips[0].dim), skip=skip)
 
 
-def test_weights_from_before_there_was_a_skip(model):
-    config = model.config()
-    del config["skip"]
-    assert LstmGmm.from_config(config).skip == 0
-
-
 def test_normalizer_of_another_encoding(clips):
     plain = encodings.from_config({**clips[0].config(), "contacts": False})
     with pytest.raises(ModelError, match="71 channels"):

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import torch
 from scipy import stats
-from tiny_lstm import tiny_lstm
+from tiny_lstm import tiny_clips, tiny_lstm
 
 import motionlab
-from motionlab import MotionLabError, datasets, weights
+from motionlab import MotionLabError, weights
 from motionlab.encodings import BodyFrame, JointAngles, Normalizer
 from motionlab.models import LstmGmm
 from motionlab.viewer.body import body
@@ -34,8 +34,7 @@ WARMTH = {"temperature": 1e-9, "component_temperature": 1e-4}  # no chance is le
 
 @pytest.fixture(scope="module")
 def clips():
-    names = ("walk_1.2", "run_3.0", "walk_0.8_turn_left_0.5", "stand")
-    return [clip for clip in datasets.load("gaits") if clip.name in names]
+    return tiny_clips("walk_1.2", "run_3.0", "walk_0.8_turn_left_0.5", "stand")
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +179,9 @@ def test_a_camera_keeps_up_and_the_past_is_forgotten(ask):
 
 @pytest.fixture(scope="module")
 def figure(model):
-    return page_figure(model, seconds=1, caption="a < b", facts={"Trained": "</script><b>"})
+    told = copy.deepcopy(model)
+    told.about = {"command": "</script><b>"}
+    return page_figure(told, seconds=1, caption="a < b")
 
 
 def test_the_figure_carries_clips_sliders_and_facts(model, figure):
@@ -189,7 +190,7 @@ def test_the_figure_carries_clips_sliders_and_facts(model, figure):
     assert content["starts"] == list(model.start_names)
     assert [clip["frames"] for clip in content["clips"]] == [31] * 4
     assert [control["name"] for control in content["controls"]] == [c.name for c in CONTROLS]
-    assert ["Trained", "</script><b>"] in content["facts"]
+    assert ["Made by", "</script><b>"] in content["facts"]
     assert "<figcaption>a &lt; b</figcaption>" in figure.html
     assert re.search(r'<noscript><img src="data:image/png;base64,', figure.html)
 

@@ -8,32 +8,23 @@ import time
 import ipywidgets
 import pytest
 import torch
+from tiny_lstm import tiny_clips, tiny_lstm
 
-from motionlab import datasets
-from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import ViewerError
-from motionlab.models import LstmGmm
-from motionlab.viewer.dream_live import controls
+from motionlab.viewer import dream
 from motionlab.viewer.player import Player
 
 
 @pytest.fixture(scope="module")
 def model():
-    torch.manual_seed(0)
-    clips = [m for m in datasets.load("gaits") if m.name in ("walk_1.2", "run_3.0")]
-    encoding = JointAngles(clips[0].skeleton, contacts=True)
-    rows = [encoding.encode(clip) for clip in clips]
-    model = LstmGmm(encoding, Normalizer.fit(rows), width=32, components=3, skip=0.6)
-    model.eval().requires_grad_(False)
-    model.starts = model.observe(torch.stack([row[:30] for row in rows]))
-    model.start_names = ("walk", "run")
+    model = tiny_lstm(tiny_clips("walk_1.2", "run_3.0"))
     model.sampling = {"temperature": 0.5}
     return model
 
 
 @pytest.fixture
 def box(model):
-    return controls(model, seconds=1)
+    return dream(model, seconds=1)
 
 
 def fields(box) -> dict[str, ipywidgets.Widget]:
@@ -55,7 +46,7 @@ def test_there_is_a_field_for_every_choice_of_generate(box):
 
 
 def test_a_model_may_have_moved_since_it_was_loaded(model, box):
-    moved = controls(copy.deepcopy(model).double(), seconds=1)
+    moved = dream(copy.deepcopy(model).double(), seconds=1)
     assert moved.children[0].payload["frames"] == player(box).payload["frames"]
 
 
@@ -99,14 +90,14 @@ def test_what_cannot_be_shown_is_said_and_the_last_motion_stays(box, model, monk
 def test_a_model_without_starts_is_refused(model, monkeypatch):
     monkeypatch.setattr(model, "start_names", ())
     with pytest.raises(ViewerError, match=r"model\.starts"):
-        controls(model)
+        dream(model)
 
 
 def test_all_but_the_network_takes_a_moment(model, monkeypatch):
     """From slider to motion half a second is allowed; nearly all of it is the network's."""
-    made = model.generate(300, type(model.starts)(*(part[:1] for part in model.starts)))
+    made = model.generate(300, model.starts[0])
     monkeypatch.setattr(model, "generate", lambda n, state, **_: made)
-    box, spent = controls(model, seconds=10), []
+    box, spent = dream(model, seconds=10), []
     for seed in range(1, 6):
         begin = time.process_time()  # others' work on this machine does not count
         fields(box)["Seed"].value = seed

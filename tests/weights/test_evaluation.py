@@ -1,5 +1,7 @@
 """`training.evaluation` against the model, plain sums, and models that fail on purpose."""
 
+import math
+
 import pytest
 import torch
 
@@ -81,3 +83,11 @@ def test_features_of_another_kind(model, gaits):
         evaluation.evaluate(model, plain)
     with pytest.raises(TrainingError, match="no split 'dev'"):
         evaluation.evaluate(model, gaits.data, "dev")
+
+
+def test_means_are_over_frames_and_leave_out_what_is_not_defined():
+    values = [{"a": 1.0, "b": math.nan}, {"a": 4.0, "b": 2.0}, {"a": 4.0, "b": math.nan}]
+    found = evaluation.over_all(values, [10, 20, 30])
+    assert found["a"].value == pytest.approx((10 + 80 + 120) / 60)
+    assert found["b"].value == 2.0 and found["b"].clips == 1
+    assert "c" not in evaluation.over_all([{"c": math.nan, "a": 1.0}], [1])

@@ -127,8 +127,8 @@ class LstmGmm(nn.Module):
             raise ModelError(f"skip is {skip!r}; it must be a share, from 0 to 1.")
         self.encoding, self.normalizer = encoding, normalizer
         self.width, self.components, self.kept = width, components, len(normalizer.kept)
-        # What is left for the network to say is about so large; it counts in this unit. Were it to
-        # count in whole ones, learning would take several times as long.
+        # What is left for the network to say is about so large; it counts in this unit, so that it
+        # need not learn first how small its words are to be.
         self.skip, self.reach = skip, max(1 - skip, 0.1)
         self.enter = nn.Sequential(
             nn.Linear(self.kept, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
@@ -318,9 +318,7 @@ class LstmGmm(nn.Module):
         """A model of the right shapes, to be filled by `load_state_dict`."""
         encoding = encodings.from_config(config["encoding"])
         normalizer = Normalizer(encoding.dim, config["kept"])
-        return cls(
-            encoding, normalizer, config["width"], config["components"], config.get("skip", 0.0)
-        )
+        return cls(encoding, normalizer, config["width"], config["components"], config["skip"])
 
     def _checked(self, features: Tensor) -> Tensor:
         features = torch.as_tensor(features).to(self.normalizer.mean)  # its device and precision

@@ -7,14 +7,14 @@ found.log_likelihood, found.samples["speed (m/s)"], found.data["speed (m/s)"]
 
 from __future__ import annotations
 
-from collections import defaultdict
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-from .. import contacts, metrics
+from .. import Skeleton, contacts, metrics
 from ..encodings import Encoding
 from ..errors import TrainingError
 from ..metrics import Interval, Limits
@@ -90,8 +90,8 @@ def evaluate(
     frozen = metrics.time_to_freeze(points, limits, fps).isfinite() & ~lost
     long = [clip for clip in clips if len(clip) >= SHORTEST * fps]
     return Evaluation(
-        likelihood(model, clips), _measured(model.encoding, list(made[~lost])),
-        _measured(model.encoding, long), len(begun), int(frozen.sum()), int(lost.sum()),
+        likelihood(model, clips), _of_clips(model.encoding, list(made[~lost])),
+        _of_clips(model.encoding, long), len(begun), int(frozen.sum()), int(lost.sum()),
     )  # fmt: skip
 
 
@@ -124,26 +124,41 @@ def _fitting(model: nn.Module, data: Prepared, split: str) -> tuple[Prepared, li
     return data, clips
 
 
-def _measured(encoding: Encoding, clips: list[Tensor]) -> dict[str, Interval]:
+def measured(positions: Tensor, skeleton: Skeleton, fps: float) -> dict[str, float]:
+    """Means over one finite motion (frames, points, 3) in metres; contacts as `contacts` finds them."""
+    down = contacts.label_positions(positions, skeleton, fps)
+    turning = metrics.turn_rate(positions, skeleton, fps).abs()
+    return {
+        "speed (m/s)": float(metrics.speed(positions, fps).mean()),
+        "turn rate, unsigned (rad/s)": float(turning.mean()),
+        "acceleration (m/s²)": float(metrics.acceleration(positions, fps)),
+        "jerk (m/s³)": float(metrics.jerk(positions, fps)),
+        "foot skate (cm/s)": float(metrics.foot_skate(positions, down, skeleton, fps)),
+        "foot skate, weighted (cm/s)": float(metrics.foot_skate_weighted(positions, skeleton, fps)),
+    }
+
+
+def over_all(values: Sequence[dict[str, float]], frames: Sequence[float]) -> dict[str, Interval]:
+    """Means over all frames of some motions, of what `measured` found; intervals over motions.
+
+    What is not finite is left out: feet that never rest have no skate.
+    """
+    found = {}
+    for key in values[0] if values else ():
+        pairs = [(v[key], n) for v, n in zip(values, frames, strict=True) if math.isfinite(v[key])]
+        if pairs:
+            found[key] = _weighted(pairs)
+    return found
+
+
+def _of_clips(encoding: Encoding, clips: Sequence[Tensor]) -> dict[str, Interval]:
     """Metrics over clips of features (frames, dim)."""
-    values, fps, skeleton = defaultdict(list), encoding.fps, encoding.skeleton
-    for clip in clips:
-        points = encoding.positions(clip)
-        down = contacts.label_positions(points, skeleton, fps)
-        each = {
-            "speed (m/s)": metrics.speed(points, fps).mean(),
-            "turn rate, unsigned (rad/s)": metrics.turn_rate(points, skeleton, fps).abs().mean(),
-            "acceleration (m/s²)": metrics.acceleration(points, fps),
-            "jerk (m/s³)": metrics.jerk(points, fps),
-            "foot skate (cm/s)": metrics.foot_skate(points, down, skeleton, fps),
-        }
-        for metric, value in each.items():
-            if value.isfinite():  # a clip without contacts has no skate
-                values[metric].append((value.item(), len(clip)))
-    return {metric: _weighted(pairs) for metric, pairs in values.items()}
+    points = [encoding.positions(clip) for clip in clips]
+    values = [measured(clip, encoding.skeleton, encoding.fps) for clip in points]
+    return over_all(values, [len(clip) for clip in clips])
 
 
-def _weighted(pairs: list[tuple[float, int]]) -> Interval:
+def _weighted(pairs: Sequence[tuple[float, float]]) -> Interval:
     """Mean of (value, frames) over frames, the interval over clips."""
     return metrics.bootstrap(
         pairs, lambda some: sum(v * n for v, n in some) / sum(n for _, n in some)

@@ -21,7 +21,7 @@ from lightning_fabric import Fabric
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from ..errors import TrainingError
+from ..errors import DivergedError, TrainingError
 from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
 from .prepared import Prepared
 from .presets import Preset
@@ -72,8 +72,9 @@ def train(
 
     Raises
     ------
-    TrainingError : the folder holds another training; the loss is no longer a number; no clip is as
-        long as a window; a file can't be written; there is no such accelerator.
+    TrainingError : the folder holds another training; no clip is as long as a window; a file can't
+        be written; there is no such accelerator.
+    DivergedError : the loss or its gradient is no longer a number.
     """
     gpu = accelerator in ("cuda", "gpu") or (accelerator == "auto" and torch.cuda.is_available())
     precision = precision or ("bf16-mixed" if gpu else "32-true")
@@ -115,7 +116,7 @@ def train(
                 network, stepper, max_norm=preset.clip, error_if_nonfinite=False
             )
             if not norm.isfinite():
-                raise TrainingError(_not_a_number(update, loss, preset, facts, Path(folder)))
+                raise DivergedError(_not_a_number(update, loss, preset, facts, Path(folder)))
             stepper.step()
             stepper.zero_grad()
             losses.append(fabric.all_reduce(loss.detach()).item())

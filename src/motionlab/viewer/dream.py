@@ -13,7 +13,7 @@ import hashlib
 import html
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from .player import Track, bundle_path, payload
 from .show import still_picture, trail_points
 
 GLOBAL = "motionlabWeights"  # where the page looks for what a script of weights brings
+TRAIL = ("hips", "left_toes", "right_toes")
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,9 @@ CONTROLS = (
 def dream(
     model: nn.Module,
     *,
-    seconds: float = 8.0,
+    seconds: float = 10.0,
     characters: int = 1,
-    trail: str | int | Sequence[str | int] = ("hips", "left_toes", "right_toes"),
+    trail: str | int | Sequence[str | int] = TRAIL,
     color: str = "RNN",
     caption: str | None = None,
     height: int = 380,
@@ -76,7 +77,7 @@ def dream(
     Parameters
     ----------
     model : as `motionlab.load` gives it.
-    seconds : of the motion that Python samples; in a page, one for each start.
+    seconds : how long the motion is at first, in a kernel; a page goes on without end.
     characters : how many futures of a start there are at first.
     trail : joints (names, roles or point indices) that leave a trail.
     color : a method's name or a colour.
@@ -87,34 +88,34 @@ def dream(
     ------
     ViewerError : another kind of model, or one without starts.
     """
-    look = {"trail": trail, "color": color, "caption": caption, "height": height}
+    look = {"trail": trail, "color": palette.check_color(color), "height": height}
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
-        return page_figure(model, seconds=seconds, characters=characters, **look)
+        return page_figure(model, characters, caption, **look)
     from .dream_live import controls
 
-    return controls(model, seconds=seconds, characters=characters, **look)
+    return controls(model, seconds, characters, caption, **look)
 
 
 def page_figure(
     model: nn.Module,
-    *,
-    seconds: float = 8.0,
     characters: int = 1,
-    trail: str | int | Sequence[str | int] = ("hips", "left_toes", "right_toes"),
-    color: str = "RNN",
     caption: str | None = None,
+    *,
+    seconds: float = 3.0,
+    trail: str | int | Sequence[str | int] = TRAIL,
+    color: str = palette.COLORS["RNN"],
     height: int = 380,
-    facts: Mapping[str, str] | None = None,
 ) -> Dream:
     """What `dream` is in a built page: no kernel, no server, also from disk.
 
-    Parameters as of `dream`, and `facts`, what else to say about the weights. The model must be an
-    `LstmGmm` on `JointAngles` with rotation vectors.
+    Parameters as of `dream`, but for `seconds`: how long the clips are, one from each start, that
+    are sampled beforehand. The model must be an `LstmGmm` on `JointAngles` with rotation vectors.
     """
     _check(model)
-    name = model.about.get("name", "network") if hasattr(model, "about") else "network"
-    weights = weights_script(model, name)
-    tracks = _clips(model, round(seconds * model.fps), palette.check_color(color))
+    weights = weights_script(model, getattr(model, "about", {}).get("name", "network"))
+    sampling = getattr(model, "sampling", {})
+    frames = round(seconds * model.fps)
+    tracks = sampled_tracks(model, model.starts, frames, seed=0, color=color, **sampling)
     common = {"height": height, "autoplay": True, "trail": trail_points(trail, tracks)}
     clips = [payload([track], model.fps, follow=True, overlay=False, **common) for track in tracks]
     dress = body(model.encoding.skeleton)
@@ -126,7 +127,7 @@ def page_figure(
         "floor": float(np.median([clip["floor"] for clip in clips])),
         "look": {
             "label": "",
-            "color": palette.check_color(color),
+            "color": color,
             "bones": [list(bone) for bone in dress.bones],
             "extras": [list(extra) for extra in dress.extras],
             "contactPoints": list(dress.feet),
@@ -134,13 +135,13 @@ def page_figure(
             "tall": max(float(track.positions[..., 1].max()) for track in tracks),
         },
     }
-    values = {"characters": characters, **getattr(model, "sampling", {})}
+    values = {"characters": characters, **sampling}
     content = {
         "clips": clips,
         "live": live,
         "starts": list(model.start_names),
         "controls": [asdict(c) | {"value": values.get(c.name, c.value)} for c in CONTROLS],
-        "facts": [*_provenance(model, weights), *(facts or {}).items()],
+        "facts": _provenance(model, weights),
     }
     return Dream(content, weights, still_picture(tracks[0]), caption)
 
@@ -203,6 +204,11 @@ def _check(model: nn.Module) -> None:
             "The browser knows features of JointAngles with rotation='vector' only; this model has "
             f"{type(encoding).__name__}."
         )
+    check_starts(model)
+
+
+def check_starts(model: nn.Module) -> None:
+    """Raise ViewerError if a model has no states to start from."""
     if not getattr(model, "start_names", ()):
         raise ViewerError(
             "This model has no states to start from; motionlab.load gives it some, or set "
@@ -211,15 +217,15 @@ def _check(model: nn.Module) -> None:
 
 
 @torch.no_grad()
-def _clips(model: nn.Module, frames: int, color: str) -> list[Track]:
-    """One motion from each start, sampled as the sliders stand at first."""
-    chance = torch.Generator(next(model.parameters()).device).manual_seed(0)
-    sampling = getattr(model, "sampling", {})
-    sampled = model.generate(frames, model.starts, generator=chance, **sampling)
-    features = torch.cat([model.starts.frame[:, None].to(sampled), sampled], dim=1).cpu()
+def sampled_tracks(
+    model: nn.Module, state: Any, frames: int, *, seed: int, color: str, **sampling: float
+) -> list[Track]:
+    """What a player shows of motions that go on from a state, its own frame first."""
+    chance = torch.Generator(next(model.parameters()).device).manual_seed(seed)
+    sampled = model.generate(frames, state, generator=chance, **sampling)
+    features = torch.cat([state.frame[:, None].to(sampled), sampled], dim=1).cpu()
     motions = [model.encoding.to_motion(row) for row in features]
-    skeleton = model.encoding.skeleton
-    return [Track(m.positions(), skeleton, "", color, m.contacts) for m in motions]
+    return [Track(m.positions(), m.skeleton, "", color, m.contacts) for m in motions]
 
 
 # -- weights ----------------------------------------------------------------------------------------

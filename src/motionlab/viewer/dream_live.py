@@ -11,16 +11,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import ipywidgets
-import torch
-from torch import Tensor, nn
+from torch import nn
 
-from ..errors import MotionLabError, ViewerError
-from . import palette
-from .dream import CONTROLS, Control
-from .player import Player, Track, payload
+from ..errors import MotionLabError
+from .dream import CONTROLS, Control, check_starts, sampled_tracks
+from .player import Player, payload
 from .show import trail_points
 
-TRAIL = ("hips", "left_toes", "right_toes")
 SECONDS = Control("seconds", "Seconds", "How long the motion is", 1, 60, 1, 10)
 # Room for the longest label; else it is cut off.
 _STYLE = {"description_width": "150px"}
@@ -28,42 +25,18 @@ _LAYOUT = ipywidgets.Layout(width="420px")
 
 
 def controls(
-    model: nn.Module,
-    *,
-    seconds: float = 10.0,
-    characters: int = 1,
-    trail: str | int | Sequence[str | int] = TRAIL,
-    color: str = "RNN",
-    caption: str | None = None,
-    height: int = 380,
+    model: nn.Module, seconds: float, characters: int, caption: str | None, **look: Any
 ) -> ipywidgets.VBox:
     """A player with sliders for all that `generate` lets one choose; each change samples anew.
 
-    Parameters
-    ----------
-    model : with ``generate``, ``encoding``, ``starts`` and ``start_names``, as `motionlab.load`
-        gives it. Sliders begin at its ``sampling``, if it has one.
-    seconds, characters : what these two sliders begin at.
-    trail : joints (names, roles or point indices) that leave a trail.
-    color : a method's name or a colour.
-    caption : a text below the player.
-    height : of the picture, pixels.
-
-    Raises
-    ------
-    ViewerError : the model has no states to start from.
+    Parameters as of `dream`. Sliders begin at the model's ``sampling``, if it has one.
     """
-    if not getattr(model, "start_names", ()):
-        raise ViewerError(
-            "This model has no states to start from; motionlab.load gives it some, or set "
-            "model.starts = model.observe(features) and model.start_names = ('name', ...)."
-        )
+    check_starts(model)
     given = {"seconds": seconds, "characters": characters, **getattr(model, "sampling", {})}
     fields = {
         c.name: _field(c, given.get(c.name, c.value), model.start_names)
         for c in (*CONTROLS, SECONDS)
     }
-    look = {"trail": trail, "color": palette.check_color(color), "height": height}
     said = ipywidgets.Label()
     player = Player(_sampled(model, _values(fields), look), caption=caption or "")
 
@@ -107,17 +80,13 @@ def _values(fields: dict[str, ipywidgets.DOMWidget]) -> dict[str, Any]:
     return {name: field.value for name, field in fields.items()}
 
 
-@torch.no_grad()
 def _sampled(model: nn.Module, values: dict[str, Any], look: dict[str, Any]) -> dict[str, Any]:
     """What the player shows for settings: futures of one start, in one picture."""
     values = dict(values)
     frames = max(1, round(values.pop("seconds") * model.fps))
     start, count = values.pop("start"), values.pop("characters")
     state = model.starts[[start] * count]
-    chance = torch.Generator(next(model.parameters()).device).manual_seed(values.pop("seed"))
-    sampled = model.generate(frames, state, generator=chance, **values)
-    features = torch.cat([state.frame[:, None].to(sampled), sampled], dim=1).cpu()
-    tracks = [_track(model, row, look["color"]) for row in features]
+    tracks = sampled_tracks(model, state, frames, color=look["color"], **values)
     return payload(
         tracks,
         model.fps,
@@ -127,8 +96,3 @@ def _sampled(model: nn.Module, values: dict[str, Any], look: dict[str, Any]) -> 
         follow=True,
         autoplay=True,
     )
-
-
-def _track(model: nn.Module, features: Tensor, color: str) -> Track:
-    motion = model.encoding.to_motion(features)
-    return Track(motion.positions(), motion.skeleton, "", color, motion.contacts)
