@@ -2,6 +2,7 @@
 
 from .errors import MotionLabError
 from .io.bvh import read_bvh, write_bvh
+from .io.gltf import write_gltf
 from .kinematics import forward_kinematics
 from .motion import Motion, concatenate
 from .skeleton import Skeleton
@@ -24,6 +25,7 @@ __all__ = [
     "show",
     "viewer",
     "write_bvh",
+    "write_gltf",
 ]
 
 

@@ -9,6 +9,10 @@ class BvhError(MotionLabError):
     """A BVH file that can't be read or written; the message names file, line and remedy."""
 
 
+class GltfError(MotionLabError):
+    """A glTF file that can't be written."""
+
+
 class SkeletonError(MotionLabError):
     """A skeleton that is not a tree of joints, or that lacks what was asked of it."""
 

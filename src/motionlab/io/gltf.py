@@ -1,0 +1,235 @@
+"""Motion as binary glTF 2.0, for Blender, game engines, three.js and the viewers of many systems.
+
+One ``.glb`` file holds the skeleton (a node per joint and end site), the animation, and a mannequin
+that the joints carry, so that there is something to see. glTF's world is ours: metres, seconds, y
+up, z ahead, right-handed. The format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import roma
+import torch
+from torch import Tensor
+
+from ..errors import GltfError
+from ..motion import Motion
+from .gltf_mesh import Skin, bind_pose, mannequin
+
+# Codes that glTF took from OpenGL.
+_COMPONENT = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
+_WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_VERTICES, _TRIANGLES = {"target": 34962}, {"target": 34963}
+_ROUGHNESS = 0.55  # as in the player
+
+
+def write_gltf(
+    motion: Motion,
+    path: str | os.PathLike,
+    *,
+    color: str = "mocap",
+    name: str | None = None,
+) -> None:
+    """Write a motion as a ``.glb`` file: skeleton, animation, and a mannequin that moves with it.
+
+    The file appears whole or not at all, and replaces one of that name. Between the frames programs
+    interpolate as `Motion.resample` does. Contacts are not written: glTF has no place for them.
+
+    Parameters
+    ----------
+    motion : any skeleton; the mannequin is fitted to it as in the player.
+    path : must end in ``.glb``; a ``.gltf`` would be a third larger, or two files that get lost.
+    color : a hex code, a name matplotlib knows, or a method's name ("mocap", "acLSTM", ...).
+    name : what the body and its animation are called in the file; None: as the motion.
+
+    Raises
+    ------
+    GltfError : the motion has no frames, or the path can't be written.
+    ViewerError : the colour is none.
+    """
+    if not isinstance(motion, Motion) or not isinstance(path, str | os.PathLike):
+        raise GltfError(
+            f"write_gltf: got {motion!r} and {path!r}; give the motion first, then the path, as in "
+            "write_gltf(motion, 'walk.glb')."
+        )
+    if not isinstance(name, str | None):
+        raise GltfError(f"write_gltf: name={name!r} is not a word; give one, as in name='walk'.")
+    path = Path(path)
+    if len(motion) == 0:
+        raise GltfError(f"{path}: the motion has no frames; there is nothing to write.")
+    if path.suffix.lower() != ".glb":
+        raise GltfError(f"{path}: the name must end in .glb, for example {path.stem}.glb.")
+    scene = _Scene(motion, name or motion.name or "motion")
+    scene.add_animation()
+    scene.add_mannequin(color)
+    content = scene.content()
+    try:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".glb-") as folder:
+            whole = Path(folder) / "whole.glb"
+            whole.write_bytes(content)
+            os.replace(whole, path)
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        reason = getattr(error, "strerror", None) or error
+        raise GltfError(f"{path}: can't be written ({reason}); check folder and rights.") from error
+
+
+class _Scene:
+    """The two halves of a file: `json`, a tree of objects that name each other by index, and
+    `buffer`, the arrays that some of them are about."""
+
+    def __init__(self, motion: Motion, name: str):
+        from .. import __version__
+
+        self.motion, self.name = motion, name
+        self.bound = bind_pose(motion)
+        self.buffer = bytearray()
+        self.json: dict = {
+            "asset": {"version": "2.0", "generator": f"motionlab {__version__}"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": self._nodes(),
+            "bufferViews": [],
+            "accessors": [],
+        }
+
+    def _nodes(self) -> list[dict]:
+        """A node per point, in the order of the points, in the bind pose."""
+        skeleton = self.motion.skeleton
+        offsets = torch.cat([skeleton.offsets, skeleton.end_offsets])
+        offsets[0] = self.bound.root_positions[0]
+        nodes = [
+            {"name": name, "translation": offset}
+            for name, offset in zip(skeleton.point_names, offsets.tolist(), strict=True)
+        ]
+        turns = _quaternions(self.bound.rotations)[0].tolist()
+        for node, turn in zip(nodes, turns, strict=False):  # end sites do not turn
+            node["rotation"] = turn
+        for point, parent in enumerate(skeleton.point_parents):
+            if parent >= 0:
+                nodes[parent].setdefault("children", []).append(point)
+        return nodes
+
+    def add_animation(self) -> None:
+        """Where the root is and how every joint is turned, each with a key at every frame."""
+        keys = self._add(np.arange(len(self.motion)) / self.motion.fps, "SCALAR", bounds=True)
+        turns = _quaternions(self.motion.rotations)
+        moves = [(0, "translation", self._add(self.motion.root_positions, "VEC3"))]
+        for joint in range(self.motion.skeleton.joints):
+            moves.append((joint, "rotation", self._add(turns[:, joint], "VEC4")))
+        self.json["animations"] = [
+            {
+                "name": self.name,
+                "channels": [
+                    {"sampler": i, "target": {"node": node, "path": what}}
+                    for i, (node, what, _) in enumerate(moves)
+                ],
+                "samplers": [
+                    {"input": keys, "interpolation": "LINEAR", "output": values}
+                    for _, _, values in moves
+                ],
+            }
+        ]
+
+    def add_mannequin(self, color: str) -> None:
+        """The mesh and its skin, on a node of its own: it is where its joints are."""
+        skin = mannequin(self.bound)
+        material = {
+            "baseColorFactor": _linear(color),
+            "metallicFactor": 0,
+            "roughnessFactor": _ROUGHNESS,
+        }
+        if skin is None:  # nothing to see, but it moves
+            return
+        lift = self._stand_on_floor(skin)
+        attributes = {
+            "POSITION": self._add(skin.vertices + lift, "VEC3", bounds=True, **_VERTICES),
+            "NORMAL": self._add(skin.normals, "VEC3", **_VERTICES),
+            "JOINTS_0": self._add(skin.joints, "VEC4", dtype="<u2", **_VERTICES),
+            "WEIGHTS_0": self._add(skin.weights, "VEC4", **_VERTICES),
+        }
+        indices = self._add(skin.triangles.ravel(), "SCALAR", dtype="<u4", **_TRIANGLES)
+        primitive = {"attributes": attributes, "indices": indices, "material": 0}
+        joints = list(range(self.motion.skeleton.joints))
+        self.json["materials"] = [{"name": self.name, "pbrMetallicRoughness": material}]
+        self.json["meshes"] = [{"name": self.name, "primitives": [primitive]}]
+        self.json["skins"] = [
+            {"joints": joints, "inverseBindMatrices": self._inverse_bind_matrices(lift)}
+        ]
+        self.json["scenes"][0]["nodes"].append(len(self.json["nodes"]))
+        self.json["nodes"].append({"name": self.name, "mesh": 0, "skin": 0})
+
+    def _stand_on_floor(self, skin: Skin) -> np.ndarray:
+        """Lift the bind pose, which programs show when nothing plays, and say by how much, (3,)."""
+        lift = np.array([0.0, -skin.vertices[:, 1].min(), 0.0])
+        self.json["nodes"][0]["translation"] = lift.tolist()
+        return lift
+
+    def _inverse_bind_matrices(self, lift: np.ndarray) -> int:
+        """From the world in the bind pose to each joint's frame; an accessor's index."""
+        turns = self.bound.orientations()[0].double().numpy().swapaxes(-1, -2)
+        places = self.bound.positions()[0, : len(turns)].double().numpy() + lift
+        matrices = np.tile(np.eye(4), (len(turns), 1, 1))
+        matrices[:, :3, :3] = turns
+        matrices[:, :3, 3] = -(turns @ places[..., None])[..., 0]
+        return self._add(matrices.swapaxes(-1, -2), "MAT4")  # glTF goes down the columns
+
+    def _add(self, values, kind: str, *, dtype="<f4", bounds=False, **view) -> int:
+        """Put an array into the buffer; the index of the accessor that tells where and what."""
+        if isinstance(values, Tensor):
+            values = values.numpy(force=True)
+        array = np.ascontiguousarray(values, dtype).reshape(-1, _WIDTH[kind])
+        accessor = {
+            "bufferView": len(self.json["bufferViews"]),
+            "componentType": _COMPONENT[dtype],
+            "count": len(array),
+            "type": kind,
+        }
+        if bounds:
+            accessor |= {"min": array.min(0).tolist(), "max": array.max(0).tolist()}
+        self.json["bufferViews"].append(
+            {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": array.nbytes, **view}
+        )
+        self.json["accessors"].append(accessor)
+        self.buffer += array.tobytes()  # of rows of 4, 8, 12 ... bytes: aligned as it must be
+        return len(self.json["accessors"]) - 1
+
+    def content(self) -> bytes:
+        """The file: a header, and each half as a chunk."""
+        self.json["buffers"] = [{"byteLength": len(self.buffer)}]
+        text = json.dumps(self.json, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = b"".join(
+            struct.pack("<I4s", len(data), kind) + data
+            for kind, data in ((b"JSON", text), (b"BIN\0", self.buffer))
+        )
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def _quaternions(rotations: Tensor) -> Tensor:
+    """Unit quaternions (frames, joints, 4), w last, of matrices (frames, joints, 3, 3).
+
+    q and -q are the same rotation; each has the sign nearer to the one before it, as programs
+    interpolate the numbers.
+    """
+    turns = roma.rotmat_to_unitquat(rotations.detach().cpu().double())
+    turns = turns / turns.norm(dim=-1, keepdim=True)
+    turned_over = (turns[1:] * turns[:-1]).sum(-1) < 0
+    turns[1:] *= torch.where(turned_over, -1.0, 1.0).cumprod(0)[..., None]
+    return turns
+
+
+def _linear(color: str) -> list[float]:
+    """Red, green, blue and opacity, 0 to 1, as light adds up: colours as written (sRGB) do not."""
+    from matplotlib.colors import to_rgb
+
+    from ..viewer.palette import check_color
+
+    rgb = np.array(to_rgb(check_color(color)))
+    rgb = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return [*rgb.round(5).tolist(), 1.0]
