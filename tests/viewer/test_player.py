@@ -155,6 +155,15 @@ def test_the_widget_holds_its_frame_inside_the_motion():
     player.close()
 
 
+def test_the_frame_that_a_page_tells_is_not_sent_back_to_it(monkeypatch):
+    """A busy kernel hears of it late: by then the page may play another motion, from frame 0."""
+    player, sent = show(standing()), []
+    monkeypatch.setattr(player, "_send", lambda message, buffers=None: sent.append(message))
+    player.set_state({"frame": 7, "playing": True})
+    assert player.frame == 7
+    assert [message["state"] for message in sent] == [{"playing": True}]
+
+
 # --- the body -----------------------------------------------------------------------------------
 
 

@@ -69,6 +69,8 @@ def test_sample_of_several_characters(here, shipped, capsys):
         (["--component-temperature", "-1"], "component_temperature"),
         (["--temperature", "1e30"], "NaN or infinite"),
         (["--noise", "nan"], "noise is nan"),
+        (["--seed", "-1"], "from 0 to"),
+        (["--seed", str(10**20)], "from 0 to"),
         (["--start", "99"], "there is none"),
         (["--start", ""], "there is none"),
         (["--start", "hop"], "0 "),
@@ -86,9 +88,13 @@ def test_sample_refuses_and_writes_nothing(here, shipped, capsys, options, said)
 
 
 def test_sample_of_weights_that_were_not_shipped(here, trained, capsys):
-    assert main(["sample", str(trained), "--seconds", "1", "--out", "w.bvh"]) == 0
-    assert "from 'mean frame'" in capsys.readouterr().out
+    command = ["sample", str(trained), "--seconds", "1", "--out", "w.bvh"]
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    assert "from 'mean frame'" in said and "no temperature of their own" in said
     assert len(motionlab.read_bvh("w.bvh")) == 30
+    assert main([*command, "--temperature", "0.5"]) == 0
+    assert "no temperature" not in capsys.readouterr().out
 
 
 def test_sample_looks_at_the_output_first(here, shipped, monkeypatch, capsys):
@@ -142,6 +148,7 @@ def test_evaluate_prints_and_writes(here, shipped, gaits, capsys):
         (["--seconds", "nan"], "1 or more"),
         (["--seconds", "1e12"], "no more"),
         (["--temperature", "0"], "temperature"),
+        (["--seed", str(2**32)], "from 0 to"),
         (["--data", "none.npz"], "no such file"),
     ],
     ids=" ".join,

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from ..errors import TrainingError
-from .sample import check_writable, given
+from .sample import check_seed, check_writable, given
 
 
 @dataclass
@@ -48,6 +48,7 @@ class Evaluate:
         from ..training.evaluation import evaluate
 
         begin = time.perf_counter()
+        check_seed(self.seed)
         if self.out is not None:
             check_writable(self.out)
         model, data = load(self.model), Prepared.find(self.data)

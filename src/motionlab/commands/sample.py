@@ -47,9 +47,13 @@ class Sample:
         model = load(self.model)
         paths, frames = self._paths(), self._frames(model.fps)
         chosen = self._starts(model.start_names)
+        check_seed(self.seed)
         for path in paths:
             check_writable(path)
         sampling = model.sampling | given(self)
+        if "temperature" not in sampling and hasattr(model, "components"):
+            print("These weights have no temperature of their own, so it is 1, as learned. If the "
+                  "body shakes, take less: --temperature 0.3", flush=True)  # fmt: skip
         if frames * len(paths) >= LONG:
             print(f"{frames * len(paths)} frames; this takes a while", flush=True)
         with torch.no_grad():
@@ -108,6 +112,12 @@ def given(command: object) -> dict[str, float]:
     """Arguments of `generate` that the command line names."""
     keys = ("temperature", "component_temperature", "noise")
     return {key: getattr(command, key) for key in keys if getattr(command, key) is not None}
+
+
+def check_seed(seed: int) -> None:
+    """Raise TrainingError for what no generator of chance takes."""
+    if not 0 <= seed < 2**32:
+        raise TrainingError(f"--seed {seed}: must be a whole number from 0 to {2**32 - 1}.")
 
 
 def check_writable(path: Path) -> None:

@@ -199,7 +199,8 @@ class Player(anywidget.AnyWidget):
     _esm = STATIC / "widget.js"
 
     payload = traitlets.Dict().tag(sync=True)
-    frame = traitlets.Int(0).tag(sync=True)
+    # no echo: while a kernel is busy frames queue up; late echoes would undo what it sets then
+    frame = traitlets.Int(0).tag(sync=True, echo_update=False)
     playing = traitlets.Bool(False).tag(sync=True)
     speed = traitlets.Float(1.0, min=0.0).tag(sync=True)
     follow = traitlets.Bool(True).tag(sync=True)
