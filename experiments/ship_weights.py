@@ -25,7 +25,7 @@ from torch import Tensor, nn
 
 import motionlab
 from motionlab import MotionLabError, contacts, datasets, weights
-from motionlab.training import PRESETS, Prepared, Preset
+from motionlab.training import PRESETS, Prepared
 from motionlab.training.checkpoints import load_weights, save_weights, write_whole
 from motionlab.training.evaluation import likelihood
 
@@ -187,7 +187,7 @@ def choose(found: list[Start]) -> list[Start]:
 
 def command_of(made: dict, source: str) -> str:
     """The command line that makes such weights again."""
-    trained = Preset(**made["preset"])
+    trained = type(PRESETS[made["name"]]["ship"])(**made["preset"])
     may_differ = ("updates", "learning_rate", "seed")
     for title, preset in PRESETS[made["name"]].items():
         differ = [key for key, value in asdict(preset).items() if getattr(trained, key) != value]

@@ -179,12 +179,13 @@ class Prepare:
 class Train:
     """Train a model; started again, it goes on where it was stopped."""
 
-    model: Positional[Literal["lstm-gmm", "lstm-gmm-contacts"]]
-    """Which model, without or with contact channels."""
+    model: Positional[str]
+    """lstm-gmm, lstm-gmm-contacts; or METHOD-STYLE, such as aclstm-indian: one of the methods aclstm,
+    lstm-3lr, scheduled, erd, seq2seq on one of the styles martial, indian, hybrid, walking."""
     preset: Literal["smoke", "table", "ship", "paper"] = "table"
     """How long and how large; see motionlab.training.presets."""
-    data: Annotated[str, arg(metavar="NAME|FOLDER|FILE")] = "locomotion"
-    """Data set, folder of BVH files, or what `prepare` wrote."""
+    data: Annotated[str | None, arg(metavar="NAME|FOLDER|FILE")] = None
+    """Data set, folder of BVH files, or what `prepare` wrote; locomotion or the style if left out."""
     start: Annotated[str | None, arg(name="from", metavar="NAME|WEIGHTS")] = None
     """Weights to begin with, for fine-tuning."""
     out: Path | None = None
@@ -214,8 +215,13 @@ class Train:
             ) from error
         chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
         chosen = {key: value for key, value in chosen.items() if value is not None}
+        if self.model not in PRESETS:
+            raise MotionLabError(
+                f"There is no model {self.model!r} to train; there are {', '.join(PRESETS)}."
+            )
         preset = replace(PRESETS[self.model][self.preset], **chosen)
-        data = Prepared.find(self.data)
+        style = "locomotion" if "lstm-gmm" in self.model else self.model.rpartition("-")[2]
+        data = Prepared.find(self.data or style)
         if self.model == "lstm-gmm":
             data = data.without_contacts()
         start = find(self.start) if self.start else None

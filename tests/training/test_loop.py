@@ -16,7 +16,7 @@ from safetensors import safe_open
 
 from motionlab import Skeleton, datasets
 from motionlab.encodings import JointAngles, Normalizer
-from motionlab.errors import TrainingError
+from motionlab.errors import DivergedError, TrainingError
 from motionlab.training import PRESETS, Prepared, build, checkpoints, loop, prepared
 
 # Validation loss of the smoke run, nats a frame. Whoever changes it on purpose changes it here. Rows
@@ -190,9 +190,13 @@ def test_a_damaged_checkpoint_is_noticed(train, smoke, tmp_path, kept):
 
 def test_a_loss_that_is_no_number_stops_it(train, smoke, tmp_path, monkeypatch):
     draw = loop.draw
-    poisoned = lambda w, p, i: (draw(w, p, i)[0], draw(w, p, i)[1] * (1.0 if i < 12 else torch.nan))
+
+    def poisoned(windows, preset, update):
+        batch, extras = draw(windows, preset, update)
+        return batch, {"noise": extras["noise"] * (1.0 if update < 12 else torch.nan)}
+
     monkeypatch.setattr(loop, "draw", poisoned)
-    with pytest.raises(TrainingError, match="Update 12: the loss is nan.*lower learning rate"):
+    with pytest.raises(DivergedError, match="Update 12: the loss is nan.*lower learning rate"):
         train(tmp_path, smoke())
     tensors, facts = content(tmp_path)
     assert facts["update"] == 10 and all(t.isfinite().all() for t in tensors.values())

@@ -6,6 +6,10 @@ units, as an encoding makes them; a state is a named tuple of tensors, batch fir
 is hidden in the model.
 """
 
-from .lstm_gmm import LstmGmm, Mixture, State
+from .aclstm import AcLstm, auto_condition
+from .erd import Erd
+from .lstm_gmm import LstmGmm, Mixture
+from .seq2seq import Seq2Seq
+from .state import State
 
-__all__ = ["LstmGmm", "Mixture", "State"]
+__all__ = ["AcLstm", "Erd", "LstmGmm", "Mixture", "Seq2Seq", "State", "auto_condition"]

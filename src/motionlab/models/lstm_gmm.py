@@ -7,8 +7,7 @@ Motion Synthesis and Control*, section 4.1.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from numbers import Integral, Real
+from numbers import Real
 from typing import NamedTuple
 
 import torch
@@ -17,32 +16,14 @@ from torch import Tensor, nn
 from .. import encodings
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
+from .checks import check_normalizer, checked_features, checked_start
 from .sampler import PRECISIONS, choose, normal, unroll
+from .state import State
 
 # Smallest standard deviations, in normalised units. A contact is 0 or 1: a Gaussian around such a
 # value could be made as narrow, and its density as high, as one likes. With 0.1 a contact that the
 # network was sure of and got wrong costs about 200 nats.
 _FLOOR, _CONTACT_FLOOR = 0.01, 0.1
-
-
-class State(NamedTuple):
-    """All that the network knows after it has seen a frame (the conditions of eq. 5).
-
-    Indexed along the batch: ``state[2:5]``, one character as ``state[2]`` (a batch of one), a start
-    for a hundred futures as ``state[[2] * 100]``.
-    """
-
-    frame: Tensor  # (batch, dim), the last input frame as it was seen, raw units
-    hidden: Tensor  # (batch, 2, width), h of both LSTM layers
-    cell: Tensor  # (batch, 2, width), C of both LSTM layers
-
-    def __getitem__(self, rows: int | slice | Sequence[int] | Tensor) -> State:
-        if isinstance(rows, Integral):
-            size = len(self.frame)
-            if not -size <= rows < size:
-                raise IndexError(f"state {rows} of a batch of {size}")
-            rows = slice(rows % size, rows % size + 1)
-        return State(*(part[rows] for part in self))
 
 
 class Mixture(NamedTuple):
@@ -118,11 +99,7 @@ class LstmGmm(nn.Module):
         skip: float = 0.0,
     ) -> None:
         super().__init__()
-        if len(normalizer.mean) != encoding.dim:
-            raise ModelError(
-                f"The normalizer is for {len(normalizer.mean)} channels, the encoding has "
-                f"{encoding.dim}; fit it on features of this encoding."
-            )
+        check_normalizer(encoding, normalizer)
         if not isinstance(skip, Real) or not 0 <= skip <= 1:
             raise ModelError(f"skip is {skip!r}; it must be a share, from 0 to 1.")
         self.encoding, self.normalizer = encoding, normalizer
@@ -152,12 +129,12 @@ class LstmGmm(nn.Module):
 
         noise : like features; added to what the network sees, in normalised units.
         """
-        features = self._checked(features)
+        features = checked_features(self, features)
         return self._run(features, self.zero_state(len(features)), noise)[0]
 
     def log_prob(self, features: Tensor, noise: Tensor | None = None) -> Tensor:
         """Log-likelihood (batch, frames - 1) of each frame but the first, given those before it."""
-        features = self._checked(features)
+        features = checked_features(self, features)
         if features.shape[1] < 2:
             raise ModelError("log_prob needs at least 2 frames: the first one is given.")
         before = None if noise is None else noise[:, :-1]
@@ -203,7 +180,7 @@ class LstmGmm(nn.Module):
     def observe(self, features: Tensor) -> State:
         """The state after features (batch, frames, dim), or (frames, dim) for a batch of one."""
         features = torch.as_tensor(features)
-        features = self._checked(features[None] if features.ndim == 2 else features)
+        features = checked_features(self, features[None] if features.ndim == 2 else features)
         return self._run(features, self.zero_state(len(features)), None)[1]
 
     def predict(self, state: State) -> Mixture:
@@ -253,19 +230,13 @@ class LstmGmm(nn.Module):
             is negative, the state is another model's or holds a NaN, the generator is on another
             device, or the precision is none of the three or not possible here.
         """
-        if not isinstance(n, Integral) or n < 1:
-            raise ModelError(f"generate: {n!r} frames; ask for 1 or more.")
+        start = checked_start(self, n, start, (2, self.width))
         for what, value in [("temperature", temperature), ("component_temperature",
                             component_temperature)]:  # fmt: skip
             if not isinstance(value, Real) or not 0 < value < math.inf:
                 raise ModelError(f"generate: {what} is {value!r}; it must be a number above 0.")
         if not isinstance(noise, Real) or not 0 <= noise < math.inf:
             raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")
-        shapes = (self.encoding.dim,), (2, self.width), (2, self.width)
-        if not isinstance(start, State) or tuple(part.shape[1:] for part in start) != shapes:
-            raise ModelError("generate: start is no state of this model; `observe` gives one.")
-        if not all(part.isfinite().all() for part in start):
-            raise ModelError("generate: start holds a NaN or infinite value.")
         if precision not in PRECISIONS:
             raise ModelError(f"generate: precision {precision!r}; it is one of {[*PRECISIONS]}.")
         like = self.normalizer.mean
@@ -274,7 +245,6 @@ class LstmGmm(nn.Module):
                 f"generate: the generator is on {generator.device.type}, the model on "
                 f"{like.device.type}; use torch.Generator({like.device.type!r})."
             )
-        start = State(*(part.to(like) for part in start))
         chance = generator, temperature, component_temperature
         if not torch.is_grad_enabled():
             return unroll(self, n, start, *chance, noise, precision)
@@ -319,15 +289,3 @@ class LstmGmm(nn.Module):
         encoding = encodings.from_config(config["encoding"])
         normalizer = Normalizer(encoding.dim, config["kept"])
         return cls(encoding, normalizer, config["width"], config["components"], config["skip"])
-
-    def _checked(self, features: Tensor) -> Tensor:
-        features = torch.as_tensor(features).to(self.normalizer.mean)  # its device and precision
-        shape = tuple(features.shape)
-        if len(shape) != 3 or shape[-1] != self.encoding.dim or 0 in shape:
-            raise ModelError(
-                f"Features have shape {shape}; this model needs (batch, frames, "
-                f"{self.encoding.dim}) with at least one frame."
-            )
-        if not features.detach().sum().isfinite():
-            raise ModelError("Features hold a NaN or infinite value; cut such frames out first.")
-        return features

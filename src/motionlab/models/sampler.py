@@ -23,7 +23,8 @@ from torch.nn import functional
 from ..errors import ModelError
 
 if TYPE_CHECKING:
-    from .lstm_gmm import LstmGmm, State
+    from .lstm_gmm import LstmGmm
+    from .state import State
 
 _rounded: WeakKeyDictionary[LstmGmm, tuple[list, list]] = WeakKeyDictionary()
 Linear = Callable[[Tensor], Tensor]  # (batch, in) -> (batch, out)

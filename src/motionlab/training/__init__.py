@@ -4,7 +4,11 @@ Data for training are one file (`prepared`), settings are a `Preset`, and what h
 one loop (`loop.train`). Only the loop needs lightning-fabric.
 """
 
+from . import dances, presets
 from .prepared import Prepared, prepare
-from .presets import PRESETS, Preset, build
+from .presets import Preset, build
+
+# Of every model that can be trained, by its name.
+PRESETS = presets.PRESETS | dances.PRESETS
 
 __all__ = ["PRESETS", "Prepared", "Preset", "build", "prepare"]

@@ -18,9 +18,9 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import MotionLabError, TrainingError
-from ..models import LstmGmm
+from ..models import AcLstm, Erd, LstmGmm, Seq2Seq
 
-_KINDS = {kind.__name__: kind for kind in (LstmGmm,)}
+_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq)}
 _STARTS = "starts."
 
 

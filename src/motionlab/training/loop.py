@@ -55,9 +55,11 @@ def train(
 
     Parameters
     ----------
-    model : has ``loss(windows, noise)``, the mean over (batch, frames, dim) windows.
+    model : has ``loss(windows, **extras)``, the mean over (batch, frames, dim) windows; extras
+        are what the preset's `extras` gives, such as noise.
     folder : receives ``checkpoint.safetensors`` (to go on from), ``best.safetensors`` (weights with
-        the lowest validation loss) and ``curve.json`` at every validation.
+        the lowest validation loss) and ``curve.json`` at every validation, and
+        ``at-UPDATE.safetensors`` where the preset asks for snapshots.
     name : of the model, kept with its weights.
     start : file of the weights that the model begins with, as `build` was given it; None if it
         begins anew. Its sha256 is kept with the weights.
@@ -89,8 +91,8 @@ def train(
         raise TrainingError(
             f"A batch of {preset.batch} windows can't be shared by {fabric.world_size} processes."
         )
-    training = Windows(data.clips("train"), preset.frames)
-    validation = Windows(data.clips("val"), preset.frames).tiles(4 * preset.batch)
+    training = preset.windows(data, "train")
+    validation = preset.windows(data, "val").tiles(4 * preset.batch)
     optimizer = OPTIMIZERS[preset.optimizer](model.parameters(), lr=preset.learning_rate)
     network, stepper = fabric.setup(model, optimizer)
     network.mark_forward_method("loss")
@@ -99,7 +101,7 @@ def train(
         "precision": precision, "start": start and _sha256(start), "update": 0, "seconds": 0.0,
         "curve": [],
     }  # fmt: skip
-    _resume(fabric, Path(folder), model, optimizer, facts)
+    _resume(fabric, Path(folder), model, optimizer, facts, preset)
 
     losses, norms, since = [], [], time.perf_counter()
     shown = progress and fabric.is_global_zero
@@ -109,8 +111,9 @@ def train(
         for update in range(facts["update"], preset.updates):
             for group in optimizer.param_groups:
                 group["lr"] = preset.rate(update)
-            windows, noise = _share(fabric, *draw(training, preset, update))
-            loss = network.loss(windows, noise)
+            windows, extras = draw(training, preset, update)
+            extras = {name: _share(fabric, tensor) for name, tensor in extras.items()}
+            loss = network.loss(_share(fabric, windows), **extras)
             fabric.backward(loss)
             norm = fabric.clip_gradients(
                 network, stepper, max_norm=preset.clip, error_if_nonfinite=False
@@ -129,27 +132,30 @@ def train(
             facts["seconds"] += time.perf_counter() - since
             facts["curve"].append({
                 "update": facts["update"], "train": statistics.fmean(losses),
-                "norm": statistics.fmean(norms), "val": evaluate(fabric, model, validation),
+                "norm": statistics.fmean(norms), "val": evaluate(fabric, model, validation, preset),
                 "seconds": facts["seconds"],
             })  # fmt: skip
             losses, norms, since = [], [], time.perf_counter()
             if fabric.is_global_zero:
-                _keep(Path(folder), model, optimizer, facts)
+                _keep(Path(folder), model, optimizer, facts, preset)
             if shown:
                 bar.write(_line(facts["curve"]))
                 sys.stdout.flush()  # for those who read along in a file
     return facts["curve"]
 
 
-def draw(windows: Windows, preset: Preset, update: int) -> tuple[Tensor, Tensor]:
-    """Windows and noise (batch, frames, dim) of an update; nothing else decides on them."""
+def draw(windows: Windows, preset: Preset, update: int) -> tuple[Tensor, dict[str, Tensor]]:
+    """Windows (batch, frames, dim) of an update and what else its loss takes, such as noise.
+
+    Nothing else decides on them.
+    """
     generator = torch.Generator().manual_seed(preset.seed * 1_000_003 + update)
     batch = windows.draw(preset.batch, generator)
-    return batch, preset.noise * torch.randn(batch.shape, generator=generator)
+    return batch, preset.extras(batch.shape, update, generator)
 
 
 @torch.no_grad()
-def evaluate(fabric: Fabric, model: nn.Module, batches: list[Tensor]) -> float:
+def evaluate(fabric: Fabric, model: nn.Module, batches: list[Tensor], preset: Preset) -> float:
     """Mean loss over windows, without noise; the processes share the batches.
 
     model : not wrapped by Fabric: a wrapped one waits for the others at every batch, and some may
@@ -158,27 +164,29 @@ def evaluate(fabric: Fabric, model: nn.Module, batches: list[Tensor]) -> float:
     model.eval()
     total = torch.zeros(2)
     for batch in batches[fabric.global_rank :: fabric.world_size]:
+        extras = {n: t.to(fabric.device) for n, t in preset.judged(batch.shape).items()}
         with fabric.autocast():
-            loss = model.loss(batch.to(fabric.device)).item()
+            loss = model.loss(batch.to(fabric.device), **extras).item()
         total += torch.tensor([loss * len(batch), len(batch)])
     model.train()
     loss, count = fabric.all_reduce(total.to(fabric.device), reduce_op="sum").tolist()
     return loss / count
 
 
-def _share(fabric: Fabric, *tensors: Tensor) -> list[Tensor]:
+def _share(fabric: Fabric, batch: Tensor) -> Tensor:
     """This process's part of a batch, on its device."""
-    return [t[fabric.global_rank :: fabric.world_size].to(fabric.device) for t in tensors]
+    return batch[fabric.global_rank :: fabric.world_size].to(fabric.device)
 
 
 def _resume(
-    fabric: Fabric, folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, facts: dict
-) -> None:
+    fabric: Fabric, folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, facts: dict,
+    preset: Preset,
+) -> None:  # fmt: skip
     """Go on from the folder's checkpoint if there is one; otherwise make the first."""
     path = folder / CHECKPOINT
     if path.exists():
         tensors, found = read_checkpoint(path)
-        _check_same(path, found, facts)
+        _check_same(path, found, facts, type(preset))
         restore(tensors, model, optimizer)
         facts |= {key: found[key] for key in ("update", "seconds", "curve")}
     fabric.barrier()  # nobody writes before all have looked
@@ -186,11 +194,15 @@ def _resume(
         save_checkpoint(path, model, optimizer, facts)  # if it can't be written, fail now
 
 
-def _keep(folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, facts: dict) -> None:
+def _keep(
+    folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, facts: dict, preset: Preset
+) -> None:
     """Write what the last validation brought. Killed in between, it is done once more."""
     curve = facts["curve"]
     if _is_best(curve):
         save_weights(folder / BEST, model, facts)
+    if preset.snapshots and facts["update"] % preset.snapshots == 0:
+        save_weights(folder / f"at-{facts['update']}.safetensors", model, facts)
     path = folder / "curve.json"
     try:
         write_whole(path, lambda stream: stream.write(json.dumps(curve, indent=1).encode()))
@@ -199,16 +211,16 @@ def _keep(folder: Path, model: nn.Module, optimizer: torch.optim.Optimizer, fact
     save_checkpoint(folder / CHECKPOINT, model, optimizer, facts)  # last: it says that all is done
 
 
-def _check_same(path: Path, found: dict, wanted: dict) -> None:
+def _check_same(path: Path, found: dict, wanted: dict, preset: type[Preset]) -> None:
     """Raise TrainingError if a checkpoint belongs to another training than the one wanted."""
     try:
-        before, after = Preset(**found["preset"]), Preset(**wanted["preset"])
+        before, after = preset(**found["preset"]), preset(**wanted["preset"])
         update = found["update"]
         was, now = (
             {key: facts[key] for key in ("name", "model", "data", "precision")}
             | {"start (--from)": facts.get("start")}
-            | asdict(replace(preset, **dict.fromkeys(_MAY_CHANGE, 1)))
-            for facts, preset in ((found, before), (wanted, after))
+            | asdict(replace(settings, **dict.fromkeys(_MAY_CHANGE, 1)))
+            for facts, settings in ((found, before), (wanted, after))
         )
     except (KeyError, TypeError) as error:
         raise TrainingError(f"{path}: is no checkpoint of this version ({error}).") from error

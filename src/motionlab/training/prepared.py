@@ -20,13 +20,22 @@ import torch
 from torch import Tensor
 
 from .. import datasets, encodings
-from ..encodings import JointAngles, Normalizer
+from ..encodings import JointAngles, Normalizer, RootRelative
 from ..errors import DataError
 from ..motion import Motion
 from ..skeleton import Skeleton
 from .checkpoints import write_whole
 
 FPS = 30.0
+# What acLSTM and its rivals learn: clips of a data set by a word in their names, with the points of
+# their own skeleton, at up to 60 frames a second.
+DANCES = {
+    "martial": ("aclstm-cmu", ("martial",)),
+    "indian": ("aclstm-cmu", ("indian",)),
+    "hybrid": ("aclstm-cmu", ("indian", "salsa")),
+    "walking": ("bandai-locomotion", ("walk",)),
+}
+DANCE_FPS, STATURE = 60.0, 1.54
 _ARRAYS = ("features", "lengths", "names", "splits", "mean", "std", "kept", "encoding")
 SPLITS = ("train", "val", "test")
 
@@ -111,7 +120,7 @@ class Prepared:
         if Path(source).suffix == ".npz" or Path(source).is_file():
             return cls.load(source)
         kept = file_of(source)
-        if str(source) in datasets.names() and kept.exists():
+        if str(source) in (*datasets.names(), *DANCES) and kept.exists():
             return cls.load(kept)
         made = prepare(source, progress=True)
         made.save(kept)
@@ -120,7 +129,7 @@ class Prepared:
 
 def file_of(source: str | os.PathLike, permissive: bool = False) -> Path:
     """Where the command line keeps what it prepared of a data set or a folder."""
-    name, known = Path(source).resolve().name, datasets.names()
+    name, known = Path(source).resolve().name, (*datasets.names(), *DANCES)
     if name in known and str(source) not in known:
         name += "-folder"  # or it would be taken for the data set from then on
     return Path("runs") / f"{name}{'-permissive' * permissive}.npz"
@@ -137,13 +146,15 @@ def prepare(
 
     Parameters
     ----------
-    source : the name of a data set, or a folder of BVH files.
+    source : the name of a data set, a folder of BVH files, or one of `DANCES`.
     progress : show how far it is.
     permissive : leave out clips whose licence forbids commercial use (of a data set).
     reading : how to read a folder's files, such as `units`; see `datasets.from_folder`.
 
     Training clips are used twice, the second time mirrored. Rows are those of `JointAngles` with
-    contacts; see `Prepared.without_contacts`.
+    contacts; see `Prepared.without_contacts`. Dances keep their skeleton and are not mirrored; what
+    was recorded at 120 frames a second is there twice at 60, odd frames and even ones. Their rows
+    are those of `RootRelative`, of a body of 1.54 m.
 
     Raises
     ------
@@ -151,10 +162,11 @@ def prepare(
     """
     from tqdm import tqdm
 
-    encoding = JointAngles(Skeleton.canonical(), fps=FPS, contacts=True)
+    encoding = None if source in DANCES else JointAngles(Skeleton.canonical(), FPS, contacts=True)
     features, names, splits = [], [], []
     for split in SPLITS:
         motions = _load(source, split, permissive, reading)
+        encoding = encoding or RootRelative(motions[0].skeleton, motions[0].fps, STATURE)
         bar = tqdm(motions, f"encoding {split}", leave=False, unit="clip", disable=not progress)
         for motion in bar:
             features.append(encoding.encode(motion))
@@ -174,7 +186,12 @@ def prepare(
 
 
 def _load(source: str | os.PathLike, split: str, permissive: bool, reading: dict) -> list[Motion]:
-    """Canonical clips of a split, in training with their mirror images."""
+    """Canonical clips of a split, in training with their mirror images; dances as they are."""
+    if source in DANCES:
+        name, words = DANCES[source]
+        motions = datasets.load(name, split, permissive=permissive)
+        motions = [m for m in motions if any(word in m.name for word in words)]
+        return [half for motion in motions for half in _halves(motion)]
     if str(source) in datasets.names():
         if reading:
             raise DataError(
@@ -191,6 +208,16 @@ def _load(source: str | os.PathLike, split: str, permissive: bool, reading: dict
     if split == "train":
         motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
     return motions
+
+
+def _halves(motion: Motion) -> list[Motion]:
+    """Every frame of a motion, in motions of at most 60 frames a second."""
+    stride = max(1, round(motion.fps / DANCE_FPS))
+    if stride == 1:
+        return [motion]
+    return [
+        replace(motion[i::stride], name=f"{motion.name}_{i + 1}/{stride}") for i in range(stride)
+    ]
 
 
 def _arrays(

@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import torch
+from torch import nn
 
 from ..errors import TrainingError
 from ..models import LstmGmm
 from .checkpoints import load_weights
 from .prepared import Prepared
+from .windows import Windows
 
 Optimizer = Literal["adam", "rmsprop", "sgd"]
 
@@ -37,10 +39,6 @@ class Preset:
     """Updates from one validation, and checkpoint, to the next."""
     width: int = 512
     """Width of the hidden layers."""
-    components: int = 5
-    """Gaussians in the mixture."""
-    skip: float = 0.9
-    """Share of the present frame that goes straight into the means; the paper's is 0."""
     noise: float = 0.05
     """Standard deviation of the noise on the input frames, in normalised units."""
     optimizer: Optimizer = "adam"
@@ -53,11 +51,13 @@ class Preset:
     """Factor on the learning rate each update, for schedules that fall from the beginning."""
     clip: float = 5.0
     """Largest norm of the gradient; what is longer is shortened to it."""
+    snapshots: int = 0
+    """Updates from one set of weights that is kept for good to the next; 0: none is."""
     seed: int = 0
     """Start of all chance: first weights, windows, noise."""
 
     def __post_init__(self) -> None:
-        counts = ("updates", "batch", "frames", "validate_every", "width", "components")
+        counts = ("updates", "batch", "frames", "validate_every", "width")
         if any(getattr(self, name) < 1 for name in counts) or self.frames < 2:
             raise TrainingError(f"{', '.join(counts)} must be 1 or more, frames 2 or more: {self}.")
         positive = self.learning_rate > 0 and self.clip > 0 and self.shrink > 0  # NaN is not
@@ -66,8 +66,11 @@ class Preset:
                 "warmup, decay, noise must not be negative, learning_rate, clip and shrink be "
                 f"positive: {self}."
             )
-        if not 0 <= self.skip <= 1:
-            raise TrainingError(f"skip is {self.skip}; it must lie between 0 and 1.")
+        if self.snapshots < 0 or self.snapshots % self.validate_every:
+            raise TrainingError(
+                f"snapshots is {self.snapshots}; weights are kept at validations only, so it must "
+                f"be a multiple of validate_every, {self.validate_every}."
+            )
         if self.optimizer not in get_args(Optimizer):
             raise TrainingError(
                 f"optimizer is {self.optimizer!r}; use one of {', '.join(get_args(Optimizer))}."
@@ -81,17 +84,56 @@ class Preset:
         fall = (self.updates - update) / (self.decay + 1)
         return self.learning_rate * min(1.0, rise, fall) * self.shrink**update
 
+    def windows(self, data: Prepared, split: str) -> Windows:
+        """Where the windows of a split come from."""
+        return Windows(data.clips(split), self.frames)
+
+    def extras(self, shape: torch.Size, update: int, generator: torch.Generator) -> dict:
+        """What the loss of an update takes beside its windows (batch, frames, dim)."""
+        return {"noise": self.noise * torch.randn(shape, generator=generator)}
+
+    def judged(self, shape: torch.Size) -> dict:
+        """The same in validation, where there is no noise."""
+        return {}
+
+    def model(self, data: Prepared) -> nn.Module:
+        """An untrained network for some data."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class MixturePreset(Preset):
+    """Settings of a training of the LSTM-GMM."""
+
+    components: int = 5
+    """Gaussians in the mixture."""
+    skip: float = 0.9
+    """Share of the present frame that goes straight into the means; the paper's is 0."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.components < 1:
+            raise TrainingError(f"components must be 1 or more: {self}.")
+        if not 0 <= self.skip <= 1:
+            raise TrainingError(f"skip is {self.skip}; it must lie between 0 and 1.")
+
+    def model(self, data: Prepared) -> LstmGmm:
+        """An untrained network for some data."""
+        return LstmGmm(data.encoding, data.normalizer, self.width, self.components, self.skip)
+
 
 # smoke: seconds, for tests. table: the equal budget of all rows of a comparison. ship: what is
 # shipped. paper: as the paper has it (300 epochs of about 200 updates; its widths are not known; it
 # clips each entry of the gradient to 5, we its norm).
 _LSTM_GMM = {
-    "smoke": Preset(
+    "smoke": MixturePreset(
         updates=40, decay=10, batch=8, frames=16, validate_every=10, width=32, warmup=5
     ),
-    "table": Preset(updates=3_000, decay=600, batch=32, frames=64, validate_every=200, width=256),
-    "ship": Preset(updates=60_000, decay=3_000, batch=32, frames=64, validate_every=200),
-    "paper": Preset(
+    "table": MixturePreset(updates=3_000, decay=600, batch=32, frames=64, validate_every=200, width=256),
+    "ship": MixturePreset(
+        updates=20_000, decay=3_000, batch=32, frames=64, validate_every=200, width=256
+    ),
+    "paper": MixturePreset(
         updates=60_000, decay=0, batch=20, frames=50, validate_every=1_000, optimizer="rmsprop",
         warmup=0, shrink=0.95 ** (1 / 200), skip=0.0,
     ),
@@ -100,7 +142,7 @@ _LSTM_GMM = {
 PRESETS = {"lstm-gmm": _LSTM_GMM, "lstm-gmm-contacts": _LSTM_GMM}
 
 
-def build(data: Prepared, preset: Preset, start: Path | None = None) -> LstmGmm:
+def build(data: Prepared, preset: Preset, start: Path | None = None) -> nn.Module:
     """The model to train: with weights drawn from the preset's seed, or those of a file.
 
     Raises
@@ -110,9 +152,7 @@ def build(data: Prepared, preset: Preset, start: Path | None = None) -> LstmGmm:
     if start is None:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(preset.seed)
-            return LstmGmm(
-                data.encoding, data.normalizer, preset.width, preset.components, preset.skip
-            )
+            return preset.model(data)
     model, _ = load_weights(start)
     if model.encoding.config() != data.encoding.config():
         raise TrainingError(

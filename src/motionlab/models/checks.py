@@ -1,0 +1,63 @@
+"""What every model asks of its input, in the same words."""
+
+from __future__ import annotations
+
+from numbers import Integral
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from ..encodings import Encoding, Normalizer
+from ..errors import ModelError
+from .state import State
+
+
+class _Model(Protocol):
+    encoding: Encoding
+    normalizer: Normalizer
+
+
+def check_normalizer(encoding: Encoding, normalizer: Normalizer) -> None:
+    """Raise ModelError if a normaliser is for another number of channels than an encoding's."""
+    if len(normalizer.mean) != encoding.dim:
+        raise ModelError(
+            f"The normalizer is for {len(normalizer.mean)} channels, the encoding has "
+            f"{encoding.dim}; fit it on features of this encoding."
+        )
+
+
+def checked_features(model: _Model, features: Tensor) -> Tensor:
+    """Features (batch, frames, dim) on the model's device, in its precision; raises ModelError."""
+    features = torch.as_tensor(features).to(model.normalizer.mean)
+    shape, dim = tuple(features.shape), model.encoding.dim
+    if len(shape) != 3 or shape[-1] != dim or 0 in shape:
+        raise ModelError(
+            f"Features have shape {shape}; this model needs (batch, frames, {dim}) with at least "
+            "one frame."
+        )
+    if not features.detach().sum().isfinite():
+        raise ModelError("Features hold a NaN or infinite value; cut such frames out first.")
+    return features
+
+
+def checked_start(
+    model: _Model,
+    n: int,
+    start: State,
+    memory: tuple[int, int],
+    cell: tuple[int, int] | None = None,
+) -> State:
+    """The state, on the model's device and in its precision, from which n frames can be generated.
+
+    memory : (layers, width) of the model's own states; cell : that of C, if it is another. Raises
+    ModelError.
+    """
+    if not isinstance(n, Integral) or n < 1:
+        raise ModelError(f"generate: {n!r} frames; ask for 1 or more.")
+    shapes = (model.encoding.dim,), memory, memory if cell is None else cell
+    if not isinstance(start, State) or tuple(part.shape[1:] for part in start) != shapes:
+        raise ModelError("generate: start is no state of this model; `observe` gives one.")
+    if not all(part.isfinite().all() for part in start):
+        raise ModelError("generate: start holds a NaN or infinite value.")
+    return State(*(part.to(model.normalizer.mean) for part in start))
