@@ -132,6 +132,23 @@ def test_one_long_bone_is_divergence(limits):
     assert float(time_to_divergence(clip, fps=FPS, limits=limits)) == 2.5
 
 
+@pytest.mark.parametrize(("seconds", "found"), [(0.5, math.inf), (1.5, 2.0)])
+def test_a_bone_may_stretch_for_less_than_it_must_last(limits, seconds, found):
+    clip, begin = walk().clone(), round(2.0 * FPS)
+    clip[begin : begin + round(seconds * FPS), 3] += 2.0
+    assert float(time_to_divergence(clip, limits, FPS)) == 2.0
+    assert float(time_to_divergence(clip, limits, FPS, lasting=1.0)) == found
+    clip[-1] = math.nan  # which is for good
+    last = min(found, (len(clip) - 1) / FPS)
+    assert float(time_to_divergence(clip, limits, FPS, lasting=1.0)) == pytest.approx(last)
+
+
+@pytest.mark.parametrize("lasting", [-1.0, math.inf, math.nan])
+def test_a_time_to_last_that_makes_no_sense(limits, lasting):
+    with pytest.raises(MetricError, match="lasting"):
+        time_to_divergence(walk(), limits, FPS, lasting)
+
+
 def test_infinite_values_are_divergence_not_freeze(limits):
     clip = plant(walk(), "nan", 2.0, FPS)
     clip[70:] = float("inf")

@@ -175,23 +175,38 @@ def stagnations(positions: Tensor, limits: Limits, fps: float) -> list[tuple[flo
     return _intervals(_still(rollouts[0], limits, fps), fps)
 
 
-def time_to_divergence(positions: Tensor, limits: Limits, fps: float) -> Tensor:
+def time_to_divergence(
+    positions: Tensor, limits: Limits, fps: float, lasting: float = 0.0
+) -> Tensor:
     """Seconds after which a motion leaves what bodies do, infinite if it never does.
 
     It has left when a value is NaN or infinite, a bone is stretched, the body shrinks, the root
     is far above or below its real heights, or a point moves faster than the limit.
 
     Parameters, result and errors as of `time_to_freeze`; a single frame is enough.
+
+    lasting : seconds for which it must be like that on end, to tell what recovers from what does
+        not: a network that names points has no bones that could not stretch for a moment. A value
+        that is not finite never recovers.
     """
     fps, rollouts, shape = _rollouts(positions, limits, fps)
-    times = []
+    if not 0 <= lasting < float("inf"):
+        raise MetricError(f"lasting is {lasting!r}; it must be a number of seconds, 0 or more.")
+    frames, times = max(1, round(lasting * fps)), []
     for rollout in rollouts:
-        bad = ~torch.isfinite(rollout).flatten(1).all(1)
+        lost = ~torch.isfinite(rollout).flatten(1).all(1)
         lengths = _bones(rollout, limits.skeleton)
-        bad |= (lengths > limits.bones.to(lengths)).any(1) | (lengths.sum(1) < limits.least_size)
+        bad = (
+            lost
+            | (lengths > limits.bones.to(lengths)).any(1)
+            | (lengths.sum(1) < limits.least_size)
+        )
         height = rollout[:, 0, 1]
         bad |= (height < limits.heights[0]) | (height > limits.heights[1])
         bad |= (_speeds(rollout, fps) > limits.speed).any(1)
+        if frames > 1:  # frame t counts if all from it on are bad, for so long
+            long = bad.unfold(0, frames, 1).all(1) if len(bad) >= frames else bad[:0]
+            bad = lost | torch.cat([long, lost[len(long) :]])
         times.append(int(bad.int().argmax()) / fps if bad.any() else float("inf"))
     return torch.tensor(times, dtype=torch.float64).reshape(shape)
 
