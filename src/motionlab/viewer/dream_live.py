@@ -14,14 +14,13 @@ import ipywidgets
 from torch import nn
 
 from ..errors import MotionLabError
-from .dream import CONTROLS, Control, check_starts, sampled_tracks
+from .dream import Control, check_starts, controls_of, sampled_tracks, trail_of
 from .player import Player, payload
-from .show import trail_points
 
 SECONDS = Control("seconds", "Seconds", "How long the motion is", 1, 60, 1, 10)
-# Room for the longest label; else it is cut off.
-_STYLE = {"description_width": "150px"}
-_LAYOUT = ipywidgets.Layout(width="420px")
+# Room for the longest label in JupyterLab's letters; else it is cut off.
+_STYLE = {"description_width": "170px"}
+_LAYOUT = ipywidgets.Layout(width="440px")
 
 
 def controls(
@@ -35,7 +34,7 @@ def controls(
     given = {"seconds": seconds, "characters": characters, **getattr(model, "sampling", {})}
     fields = {
         c.name: _field(c, given.get(c.name, c.value), model.start_names)
-        for c in (*CONTROLS, SECONDS)
+        for c in (*controls_of(model), SECONDS)
     }
     said = ipywidgets.Label()
     player = Player(_sampled(model, _values(fields), look), caption=caption or "")
@@ -51,10 +50,13 @@ def controls(
             player.frame, player.payload, player.overlay = 0, content, content["overlay"]
             player.playing = True
         said.value = f"{content['frames']} frames in {time.perf_counter() - begin:.2f} s"
+        first, *others = content["tracks"]
+        if others and all(track == first for track in others):
+            said.value += ". Without noise a start has one future: all characters do the same."
 
     for field in fields.values():
         field.observe(sample, names="value")
-    columns = ipywidgets.Layout(grid_template_columns="repeat(auto-fill, 430px)")
+    columns = ipywidgets.Layout(grid_template_columns="repeat(auto-fill, 450px)")
     return ipywidgets.VBox(
         [player, ipywidgets.GridBox(list(fields.values()), layout=columns), said]
     )
@@ -90,7 +92,7 @@ def _sampled(model: nn.Module, values: dict[str, Any], look: dict[str, Any]) -> 
     return payload(
         tracks,
         model.fps,
-        trail=trail_points(look["trail"], tracks),
+        trail=trail_of(look["trail"], tracks),
         height=look["height"],
         overlay=count > 1,
         follow=True,

@@ -1,8 +1,24 @@
 // weight · x + bias, where all the time goes: five million products a frame.
 // Four rows at once, and two characters at once, so that a number that was fetched is used often.
 
-/** outputs[k] = weight · inputs[k] + bias for every character k. The rows are a multiple of four. */
-export function affine({ weight, bias, columns }, inputs, outputs) {
+/** A linear layer and what it said last. */
+export class Linear {
+  /** `layer` from weights.js; its rows are a multiple of four. */
+  constructor(layer) {
+    this.layer = layer;
+    this.outputs = [];
+  }
+
+  /** An output for each character's input. The next call writes over it. */
+  of(inputs) {
+    const outputs = inputs.map((_, k) => (this.outputs[k] ??= new Float32Array(this.layer.rows)));
+    affine(this.layer, inputs, outputs);
+    return outputs;
+  }
+}
+
+/** outputs[k] = weight · inputs[k] + bias for every character k. */
+function affine({ weight, bias, columns }, inputs, outputs) {
   let k = 0;
   for (; k + 1 < inputs.length; k += 2) two(weight, bias, columns, inputs[k], outputs[k], inputs[k + 1], outputs[k + 1]);
   if (k < inputs.length) one(weight, bias, columns, inputs[k], outputs[k]);

@@ -1,18 +1,23 @@
 // Lets a network go on from a start, each frame fed back to get the next, for several characters at
 // once. Settings act on the next frame.
+import { AcLstm } from "./aclstm.js";
 import { JointAngles } from "./joint_angles.js";
 import { LiveTrack } from "./live_track.js";
 import { LstmGmm } from "./lstm_gmm.js";
-import { Random, sample } from "./mixture.js";
+import { Random } from "./mixture.js";
+import { RootRelative } from "./root_relative.js";
+
+const NETWORKS = { AcLstm, LstmGmm };
+const ENCODINGS = { JointAngles, RootRelative };
 
 export class Dreamer {
   /**
    * `weights` from weights.js; `look` says how the tracks look (bones, extras, color, ...);
-   * `settings`: temperature, component_temperature, noise, start, seed, characters.
+   * `settings`: start, seed, characters, noise, and what the network's `draw` takes.
    */
   constructor(weights, look, settings) {
-    this.network = new LstmGmm(weights.network);
-    this.encoding = new JointAngles(weights.encoding);
+    this.network = new NETWORKS[weights.kind](weights.layers, weights.settings);
+    this.encoding = new ENCODINGS[weights.encoding.kind](weights.encoding);
     this.normalizer = weights.normalizer;
     this.starts = weights.starts;
     this.fps = weights.fps;
@@ -40,17 +45,16 @@ export class Dreamer {
 
   enter(number) {
     const start = this.starts[this.settings.start];
-    const { width } = this.network;
-    const layers = (numbers) => [numbers.slice(0, width), numbers.slice(width)];
+    const layers = (numbers) => this.network.lstm.map(({ width, depth }) => numbers.slice(depth * width, (depth + 1) * width));
     const character = {
       input: this.normalize(start.frame),
       hidden: layers(start.hidden),
       cell: layers(start.cell),
-      place: { x: 0, z: 0, yaw: 0 },
+      place: this.encoding.begin(start.frame),
       random: new Random(1000 * this.settings.seed + number),
       track: new LiveTrack(this.encoding.count, this.fps, this.last, this.look),
     };
-    character.next = this.network.predict(character);
+    [character.next] = this.network.predict([character]);
     this.characters[number] = character;
     this.tracks[number] = character.track;
     this.show(character, start.frame);
@@ -59,16 +63,16 @@ export class Dreamer {
   /** One frame more for all characters. */
   advance() {
     const { noise } = this.settings;
-    const drawn = this.characters.map(({ next, random }) => sample(next, random, this.settings));
+    const drawn = this.characters.map(({ next, random }) => this.network.draw(next, random, this.settings));
     this.characters.forEach((character, k) => {
       character.input = noise ? drawn[k].map((value) => value + noise * character.random.normal()) : drawn[k];
     });
-    const mixtures = this.network.step(this.characters);
+    const next = this.network.step(this.characters);
     this.last++;
     this.characters.forEach((character, k) => {
       const row = this.denormalize(drawn[k]);
       if (!row.every(Number.isFinite)) return this.enter(k); // it has exploded: begin again
-      character.next = mixtures[k];
+      character.next = next[k];
       character.place = this.encoding.walk(character.place, row);
       this.show(character, row);
     });

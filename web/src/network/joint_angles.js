@@ -12,6 +12,11 @@ export class JointAngles {
     this.count = parents.length + end_parents.length;
   }
 
+  /** Where a row stands that nothing came before. */
+  begin() {
+    return { x: 0, z: 0, yaw: 0 };
+  }
+
   /** Where a step of a row leads from a place {x, z, yaw}; the step is seen from there (eq. 4). */
   walk({ x, z, yaw }, [left, ahead, turn]) {
     const [sine, cosine] = [Math.sin(yaw), Math.cos(yaw)];

@@ -1,5 +1,5 @@
-// The weights as motionlab/viewer/dream.py writes them, read back. They come as a script, because a
-// page opened from disk may load scripts and nothing else.
+// The weights as motionlab/viewer/network_weights.py writes them, read back. They come as a script,
+// because a page opened from disk may load scripts and nothing else.
 
 const SHELF = "motionlabWeights"; // where the scripts put what they bring
 
@@ -45,17 +45,16 @@ function readLayer({ columns, bias, weight, scales }) {
 
 /** All that a Dreamer needs: the network, the body's encoding, and states to start from. */
 export function readWeights(file) {
-  const { width, components, skip, reach, fps, kept } = file;
+  const { kind, fps, kept, encoding } = file;
   const { enter, lstm, leave } = file.layers;
   const starts = file.starts.map(({ name, frame, hidden, cell }) => ({ name, frame: floats(frame), hidden: floats(hidden), cell: floats(cell) }));
   return {
+    kind,
     fps,
     starts,
-    network: {
-      width, components, skip, reach, kept: kept.length, floor: floats(file.floor),
-      layers: { enter: enter.map(readLayer), lstm: lstm.map(readLayer), leave: readLayer(leave) },
-    },
+    encoding,
+    layers: { enter: enter.map(readLayer), lstm: lstm.map(readLayer), leave: readLayer(leave) },
+    settings: { ...file.settings, kept: kept.length },
     normalizer: { kept, mean: floats(file.mean), std: floats(file.std) },
-    encoding: file.encoding,
   };
 }
