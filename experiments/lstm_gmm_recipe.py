@@ -15,7 +15,7 @@ import json
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -23,10 +23,11 @@ import numpy as np
 import recipe_data
 import record
 import rollouts
+import trainings
 from torch import nn
+from trainings import Run
 
-from motionlab.errors import DivergedError
-from motionlab.training import PRESETS, Prepared, Preset, build
+from motionlab.training import PRESETS, Prepared, Preset
 from motionlab.training.checkpoints import load_weights, write_whole
 from motionlab.training.evaluation import likelihood, measured, over_all, starting_windows
 
@@ -36,12 +37,9 @@ TRIAL = 0.25  # of the updates, with which a learning rate is tried
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(trainings.Row):
     """Trainings that differ in their seed only."""
 
-    name: str
-    what: str
-    changes: dict = field(default_factory=dict)  # of the preset
     data: str = "locomotion"  # see recipe_data
     rates: Sequence[float] = ()  # learning rates to choose from
     first: str | None = None  # row whose weights it begins with
@@ -64,45 +62,6 @@ ROWS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Run:
-    """One training."""
-
-    row: Row
-    seed: int
-    preset: Preset
-    folder: Path
-    first: Path | None = None
-
-    @property
-    def made(self) -> int:
-        """Updates that are done."""
-        curve = self.folder / "curve.json"
-        return json.loads(curve.read_text())[-1]["update"] if curve.exists() else 0
-
-    @property
-    def validation(self) -> float:
-        """The lowest loss on validation clips so far; infinite if none is finite."""
-        curve = json.loads((self.folder / "curve.json").read_text())
-        found = [point["val"] for point in curve if math.isfinite(point["val"])]
-        return min(found, default=math.inf)
-
-    def train(self) -> None:
-        """Train, or go on; a training that falls apart counts as done with what it has."""
-        from motionlab.training.loop import train
-
-        data = recipe_data.of(self.row.data)
-        model = build(data, self.preset, self.first)
-        try:
-            train(model, data, self.preset, self.folder, name=NAME, start=self.first, progress=True)
-        except DivergedError as error:
-            (self.folder / "failed.txt").write_text(str(error), encoding="utf-8")
-
-    @property
-    def done(self) -> bool:
-        return self.made >= self.preset.updates or (self.folder / "failed.txt").exists()
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--preset", default="table", choices=list(PRESETS[NAME]))
@@ -121,16 +80,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rows = [row for row in ROWS if chosen.only is None or row.name in chosen.only]
     part, parts = map(int, chosen.share.split("/"))
     if chosen.list:
-        for row in rows:
-            for run in runs_of(row, base, folder):
-                print(f"{run.made:6} of {run.preset.updates:6}  {run.folder}")
+        trainings.show(run for row in rows for run in runs_of(row, base, folder))
         return
     for row in shared(rows, part, parts):
         for seed in SEEDS:
             for run in needed(row, seed, base, folder):
                 if not run.done:
-                    print(f"\n{run.folder}: {row.what}", flush=True)
-                    run.train()
+                    run.train(recipe_data.of(run.row.data), NAME)
     if parts > 1:
         print("this share is done; start without --share once all are, for the result")
         return
@@ -239,8 +195,7 @@ def evaluated(run: Run, starts: int, seconds: float) -> dict:
         return json.loads(kept.read_text())
     data = recipe_data.of(run.row.data)
     path = run.folder / "best.safetensors"
-    failed = (run.folder / "failed.txt").exists()
-    found = {"seed": run.seed, "fell apart": failed}
+    found = {"seed": run.seed, "fell apart": run.fell_apart}
     if path.exists():
         model, about = load_weights(path)
         model.eval().requires_grad_(False)

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from torch.nn.functional import max_pool1d
 
 from motionlab import Skeleton, metrics
+from motionlab.contacts import foot_points, rest_heights
 from motionlab.encodings import Encoding
 from motionlab.training import Prepared
 
@@ -22,7 +23,7 @@ KINDS = ("frozen", "diverged", "off floor")
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """What failure is, read off real motion on the same skeleton, whose rest pose stands on y = 0.
+    """What failure is, read off real motion on the same skeleton.
 
     low, high : cm, height of the lowest foot below (above) which a body is off the floor if it
         stays there for a second.
@@ -64,7 +65,10 @@ class Judge:
 
 def _held(positions: Tensor, skeleton: Skeleton, fps: float) -> tuple[Tensor, Tensor]:
     """Heights (windows,) in cm above (below) which the lowest foot is for a whole second."""
-    lowest = metrics.floating(positions, skeleton) - metrics.penetration(positions, skeleton)
+    flat = rest_heights(skeleton)
+    if flat.min() < 0:  # the rest pose hangs from a root at the origin: let it stand
+        flat = flat - flat.min()
+    lowest = 100 * (positions[..., foot_points(skeleton), 1] - flat.to(positions)).amin(-1)
     pool = lambda values: max_pool1d(values[None], round(WHOLE * fps), 1)[0]
     return -pool(-lowest), pool(lowest)
 

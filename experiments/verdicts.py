@@ -13,26 +13,14 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
+import verdicts_aclstm
 import yaml
+from verdict import NOT, OPEN, PARTLY, REPRODUCED, UNTESTABLE, VERDICTS, Absent, Verdict
+
+__all__ = ["VERDICTS", "Verdict", "claims", "judge", "results_of", "rule_of"]
 
 ROOT = Path(__file__).resolve().parents[1]
-REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
-UNTESTABLE, OPEN = "not testable here", "open"
-VERDICTS = (REPRODUCED, PARTLY, NOT, UNTESTABLE, OPEN)
-
-
-class Verdict(NamedTuple):
-    """One of VERDICTS, the numbers behind it, and what must be said with it."""
-
-    verdict: str
-    numbers: dict[str, float | str]
-    remark: str = ""
-
-
-class Absent(Exception):
-    """What a verdict needs has not been measured yet."""
 
 
 def claims() -> list[dict]:
@@ -300,7 +288,7 @@ RULES = {
     "W1-variety": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
     "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
     "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W4-generator": w4_generator,
-    "W8": w8, "W10": w10,
+    "W8": w8, "W10": w10, **verdicts_aclstm.RULES,
 }  # fmt: skip
 
 

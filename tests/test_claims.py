@@ -6,6 +6,7 @@ import shlex
 import sys
 from pathlib import Path
 
+import aclstm_cases
 import pytest
 import yaml
 
@@ -209,6 +210,7 @@ CASES = [
     ("W10", "reproduced", sizes(300, 30, 11)),
     ("W10", "partly", sizes(300, 30, 9)),
     ("W10", "not", sizes(9, 9, 9)),
+    *aclstm_cases.CASES,
 ]  # fmt: skip
 
 
@@ -339,7 +341,7 @@ def test_a_training_under_way_is_gone_on_with(clone, capsys):
 
 
 @pytest.mark.parametrize(
-    ("names", "said"), [(("W99",), "no claim 'W99'"), (("W1", "Z1"), "Z1: is open")]
+    ("names", "said"), [(("W99",), "no claim 'W99'"), (("W1", "S1"), "S1: is open")]
 )
 def test_reproduce_of_what_is_not_there(clone, names, said):
     with pytest.raises(MotionLabError, match=said):

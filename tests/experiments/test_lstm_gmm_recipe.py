@@ -104,6 +104,6 @@ def test_a_training_that_falls_apart_is_told_and_not_begun_again(recipe, tmp_pat
     )
     base = PRESETS["lstm-gmm"]["smoke"]
     run = recipe.final(wild, 0, base, tmp_path)
-    run.train()
+    run.train(recipe.recipe_data.of(wild.data), recipe.NAME)
     assert run.done and (run.folder / "failed.txt").exists()
     assert recipe.evaluated(run, 2, 1.0)["fell apart"] is True
