@@ -238,8 +238,8 @@ def without_rest(clip: Tensor, fps: float, least: float = 0.3) -> Tensor:
 # ship: what is shipped. table: the equal budget of all rows of a comparison: updates, windows, and
 # about as many parameters. paper: the paper's own.
 _TABLE = DancePreset(
-    updates=4_000, decay=0, batch=32, frames=100, validate_every=200, width=256, noise=0.0,
-    learning_rate=5e-4, snapshots=1_000, schedule=4_000,
+    updates=3_000, decay=0, batch=32, frames=100, validate_every=250, width=256, noise=0.0,
+    learning_rate=5e-4, snapshots=500, schedule=3_000,
 )  # fmt: skip
 _PRESETS = {
     "smoke": DancePreset(

@@ -4,6 +4,7 @@ from importlib import import_module
 
 from . import palette
 from .dream import dream
+from .feeding import feeding
 from .player import Player, bundle_path
 from .show import show
 
@@ -13,6 +14,7 @@ __all__ = [
     "Player",
     "bundle_path",
     "dream",
+    "feeding",
     "filmstrip",
     "palette",
     "plots",

@@ -17,6 +17,8 @@ COLORS = {
     "RNN+c": "#e3b93a",
     "GAN2+lock": "#5b5fc7",
     "acLSTM": "#1f9e7a",
+    "LSTM-3LR": "#8f9e3b",
+    "scheduled": "#7d8fd1",
     "ERD": "#a6761d",
     "seq2seq": "#8c6bb1",
     "STRNN": "#c9689c",
