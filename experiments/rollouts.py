@@ -27,12 +27,14 @@ class Judge:
 
     low, high : cm, height of the lowest foot below (above) which a body is off the floor if it
         stays there for a second.
+    lasting : seconds for which a body must have diverged on end.
     """
 
     limits: metrics.Limits
     low: float
     high: float
     fps: float
+    lasting: float = 0.0
 
     @classmethod
     def fit(cls, clips: Sequence[Tensor], skeleton: Skeleton, fps: float) -> Judge:
@@ -49,7 +51,9 @@ class Judge:
         """Seconds until one motion (frames, points, 3) fails in each way; infinite if never."""
         found = {
             "frozen": float(metrics.time_to_freeze(positions, self.limits, self.fps)),
-            "diverged": float(metrics.time_to_divergence(positions, self.limits, self.fps)),
+            "diverged": float(
+                metrics.time_to_divergence(positions, self.limits, self.fps, self.lasting)
+            ),
             "off floor": math.inf,
         }
         whole = len(positions)

@@ -305,3 +305,14 @@ def test_survival_asks_for_times_and_horizon():
 
 
 SKELETON_REST = gaits.make(seconds=0.1, speed=0).positions()[0]
+
+
+def test_one_pause_that_twitches_is_one_stagnation(limits):
+    """Windows before and after a twitch overlap; the body stood from the first to the last."""
+    clip = walk().clone()
+    clip[30:75] = clip[30]
+    twitch = clip.clone()
+    twitch[52, 5] += 0.12  # one point, one frame
+    whole, found = (stagnations(c, limits, FPS) for c in (clip, twitch))
+    assert len(whole) == 1 and len(found) in (1, 2)
+    assert all(b < c for (_, b), (c, _) in zip(found, found[1:], strict=False))

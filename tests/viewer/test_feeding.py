@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from motionlab.errors import ModelError
+from motionlab.errors import ViewerError
+from motionlab.models import auto_condition
 from motionlab.viewer import feeding
 
 
@@ -15,8 +16,9 @@ def cells(page: str) -> list[bool]:
 
 @pytest.mark.parametrize(("real", "fed"), [(5, 5), (1, 4), (7, 0), (3, 30)])
 def test_without_scripts_it_shows_the_pattern_it_was_asked_for(real, fed):
-    page = feeding(real, fed, caption="a < b").data
-    assert cells(page) == [t % (real + fed) < real for t in range(60)]
+    page = feeding(real, fed, caption="a < b")._repr_html_()
+    pattern = auto_condition(60, real, fed).tolist()
+    assert cells(page) == pattern == [t % (real + fed) < real for t in range(60)]
     assert "<figcaption>a &lt; b</figcaption>" in page
     for name, value in (("real", real), ("fed", fed)):
         most = int(re.search(rf'name="{name}" min="\d" max="(\d+)" value="{value}"', page)[1])
@@ -24,10 +26,11 @@ def test_without_scripts_it_shows_the_pattern_it_was_asked_for(real, fed):
 
 
 def test_two_figures_of_a_page_have_their_own_names():
-    first, second = (re.search(r'id="(feeding-\w+)"', feeding().data)[1] for _ in range(2))
+    first, second = (re.search(r'id="(feeding-\w+)"', feeding().html)[1] for _ in range(2))
     assert first != second
 
 
 def test_a_pattern_that_makes_no_sense():
-    with pytest.raises(ModelError, match="u must"):
-        feeding(0, 5)
+    for real, fed in ((0, 5), (5, -1), (2.5, 5)):
+        with pytest.raises(ViewerError, match="u must"):
+            feeding(real, fed)

@@ -305,10 +305,12 @@ def _still(rollout: Tensor, limits: Limits, fps: float) -> Tensor:
 
 
 def _intervals(still: Tensor, fps: float) -> list[tuple[float, float]]:
-    """Seconds from the first frame of the first to the last of the last of successive windows."""
-    edges = np.flatnonzero(np.diff(np.r_[0, still.cpu().numpy().astype(int), 0])).reshape(-1, 2)
+    """Seconds from the first frame of the first to the last of the last of windows that touch."""
     more = _window(fps) - 1
-    return [(int(begin) / fps, (int(end) + more) / fps) for begin, end in edges]
+    windows = still.cpu().numpy()
+    inside = np.convolve(windows, np.ones(more + 1)) > 0  # frames of any such window
+    edges = np.flatnonzero(np.diff(np.r_[0, inside.astype(int), 0])).reshape(-1, 2)
+    return [(int(begin) / fps, int(end) / fps) for begin, end in edges]
 
 
 def _bones(positions: Tensor, skeleton: Skeleton) -> Tensor:

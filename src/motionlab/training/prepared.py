@@ -191,6 +191,8 @@ def _load(source: str | os.PathLike, split: str, permissive: bool, reading: dict
         name, words = DANCES[source]
         motions = datasets.load(name, split, permissive=permissive)
         motions = [m for m in motions if any(word in m.name for word in words)]
+        if name != "aclstm-cmu":  # bodies of several sizes, in files whose rest pose lies down
+            motions = [motion.retarget() for motion in motions]
         return [half for motion in motions for half in _halves(motion)]
     if str(source) in datasets.names():
         if reading:

@@ -10,9 +10,7 @@ from __future__ import annotations
 import html
 import uuid
 
-from IPython.display import HTML
-
-from ..models import auto_condition
+from ..errors import ViewerError
 from . import palette
 
 _FRAMES, _MOST = 60, 20
@@ -55,9 +53,19 @@ _PAGE = """
 """
 
 
+class Feeding:
+    """A figure for a notebook or a page."""
+
+    def __init__(self, page: str) -> None:
+        self.html = page
+
+    def _repr_html_(self) -> str:
+        return self.html
+
+
 def feeding(
     real: int = 5, fed: int = 5, *, fps: float = 30.0, caption: str | None = None
-) -> HTML:
+) -> Feeding:
     """The pattern of auto-conditioned training (acLSTM, figure 1), under sliders for u and v.
 
     Parameters
@@ -68,15 +76,17 @@ def feeding(
 
     Raises
     ------
-    ModelError : `real` is not 1 or more, or `fed` not 0 or more.
+    ViewerError : `real` is not 1 or more, or `fed` not 0 or more.
     """
-    pattern = auto_condition(_FRAMES, real, fed).tolist()
-    return HTML(
+    if not (isinstance(real, int) and isinstance(fed, int) and real >= 1 and fed >= 0):
+        raise ViewerError(f"feeding: u is {real!r}, v {fed!r}; u must be 1 or more, v 0 or more.")
+    recorded = [t % (real + fed) < real for t in range(_FRAMES)]
+    return Feeding(
         _PAGE.format(
             key=f"feeding-{uuid.uuid4().hex[:8]}",
             recorded=palette.COLORS["mocap"],
             own=palette.COLORS["acLSTM"],
-            cells="".join("<i></i>" if is_real else '<i class="own"></i>' for is_real in pattern),
+            cells="".join("<i></i>" if is_real else '<i class="own"></i>' for is_real in recorded),
             real=real,
             fed=fed,
             most=max(_MOST, real, fed),

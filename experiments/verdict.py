@@ -1,0 +1,21 @@
+"""What a rule returns."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
+UNTESTABLE, OPEN = "not testable here", "open"
+VERDICTS = (REPRODUCED, PARTLY, NOT, UNTESTABLE, OPEN)
+
+
+class Verdict(NamedTuple):
+    """One of VERDICTS, the numbers behind it, and what must be said with it."""
+
+    verdict: str
+    numbers: dict[str, float | str]
+    remark: str = ""
+
+
+class Absent(Exception):
+    """What a verdict needs has not been measured yet."""

@@ -1,0 +1,19 @@
+"""A dance goes into a file, and what is said of the file into the result."""
+
+import json
+
+import pytest
+
+pytest.importorskip("lightning_fabric")
+
+
+def test_dance_is_written_and_judged(experiment, untrained, tmp_path, monkeypatch):
+    script = experiment("dances_gltf")
+    untrained("aclstm-hybrid")
+    weights = next(tmp_path.rglob("at-40.safetensors"))
+    said = [{"severity": 0, "message": "wrong"}, {"severity": 1, "message": "odd"}]
+    monkeypatch.setattr(script, "validated", lambda path: said if path.stat().st_size else [])
+    script.main(["--model", str(weights), "--seconds", "0.5", "--output", "found.json"])
+    found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
+    assert (found["frames"], found["errors"], found["warnings"]) == (15, 1, 1)
+    assert (tmp_path / "runs" / "dances" / "dance.glb").read_bytes()[:4] == b"glTF"
