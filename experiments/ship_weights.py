@@ -19,7 +19,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import record
-import temperature
 import torch
 from torch import Tensor, nn
 
@@ -28,6 +27,7 @@ from motionlab import MotionLabError, contacts, datasets, weights
 from motionlab.training import PRESETS, Prepared
 from motionlab.training.checkpoints import load_weights, save_weights, write_whole
 from motionlab.training.evaluation import likelihood
+from motionlab.training.finish import fit_temperature
 
 FOLDER = Path(motionlab.__file__).parent / "weights"
 OBSERVED = AFTER = (
@@ -100,7 +100,7 @@ def ship(name: str, file: Path, source: str, folder: Path, sampling: dict[str, f
         parameter.data = parameter.half().float()
     halved.eval()
     if "temperature" not in sampling:
-        sampling = {"temperature": temperature.fit(halved, clips, **sampling)} | sampling
+        sampling = {"temperature": fit_temperature(halved, clips, **sampling)} | sampling
     starts = choose(candidates(data))
     observed = round(OBSERVED * model.fps)
     with torch.no_grad():  # by the network as it will be

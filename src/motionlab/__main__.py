@@ -204,10 +204,13 @@ class Train:
     """Machines."""
 
     def run(self) -> None:
+        import torch
+
         from .training import PRESETS, Prepared, build
         from .weights import find
 
         try:
+            from .training.finish import finish
             from .training.loop import train
         except ModuleNotFoundError as error:
             raise MotionLabError(
@@ -231,9 +234,13 @@ class Train:
             model, data, preset, out, name=self.model, start=start,
             accelerator=self.accelerator, devices=self.devices, nodes=self.nodes, progress=True,
         )  # fmt: skip
+        if torch.distributed.is_initialized() and torch.distributed.get_rank():
+            return  # one process is enough for what is left
+        sampling = finish(out / "best.safetensors", data, preset)
         best = min(curve, key=lambda point: point["val"])
         print(f"{out}: {curve[-1]['update']} updates; best of validation {best['val']:.3f} at "
-              f"update {best['update']}, in best.safetensors")  # fmt: skip
+              f"update {best['update']}, in best.safetensors"
+              + "".join(f"; {key} {value:g}" for key, value in sampling.items()))  # fmt: skip
 
 
 COMMANDS = (

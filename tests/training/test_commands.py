@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+import motionlab
 from motionlab import write_bvh
 from motionlab.__main__ import main
 from motionlab.datasets import gaits
@@ -39,7 +40,12 @@ def test_train_prepares_trains_and_goes_on(here, capsys):
     assert main(["train", "lstm-gmm-contacts", *SMOKE, *start]) == 1
     assert "features of another kind" in capsys.readouterr().err
     assert main(["train", "lstm-gmm", *SMOKE, *start, "--out", "tuned"]) == 0
-    assert (here / "tuned" / "best.safetensors").exists()
+    # what a training leaves can be used as it is
+    tuned = motionlab.load(here / "tuned" / "best.safetensors")
+    assert len(tuned.starts.frame) == len(tuned.start_names) == 8
+    assert 0.1 <= tuned.sampling["temperature"] <= 1
+    assert main(["sample", "tuned/best.safetensors", "--seconds", "1", "--out", "a.bvh"]) == 0
+    assert "from 'validation 1'" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
