@@ -131,7 +131,7 @@ _LSTM_GMM = {
     ),
     "table": MixturePreset(updates=3_000, decay=600, batch=32, frames=64, validate_every=200, width=256),
     "ship": MixturePreset(
-        updates=20_000, decay=3_000, batch=32, frames=64, validate_every=200, width=256
+        updates=10_000, decay=3_000, batch=32, frames=64, validate_every=200, width=256
     ),
     "paper": MixturePreset(
         updates=60_000, decay=0, batch=20, frames=50, validate_every=1_000, optimizer="rmsprop",
