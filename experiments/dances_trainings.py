@@ -23,7 +23,7 @@ from motionlab.training import PRESETS
 from motionlab.training.checkpoints import write_whole
 from motionlab.training.dances import METHODS
 
-PLAIN = ("aclstm-indian", "lstm-3lr-indian")  # seen again after every thousand updates
+PLAIN = ("aclstm-indian", "lstm-3lr-indian")  # seen again on their way
 
 
 @dataclass(frozen=True)

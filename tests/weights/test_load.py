@@ -149,13 +149,14 @@ def test_card_says_what_the_file_holds(model, shipped, gaits, tmp_path):
     assert motionlab.load(shutil.copy(shipped, tmp_path / "b.safetensors")).hash == model.hash
 
 
-def test_card_says_what_a_training_began_with(model, shipped, ship_weights, monkeypatch):
+def test_card_says_what_a_training_began_with(model, shipped, experiment, monkeypatch):
+    cards = experiment("cards")
     assert "| began with | chance |" in model.card
     made = {**model.about, "name": "lstm-gmm-contacts", "start": model.hash}
-    assert " --from WEIGHTS --updates 60" in ship_weights.command_of(made, "gaits")
+    assert " --from WEIGHTS --updates 60" in cards.command_of(made, "gaits")
     monkeypatch.setattr(weights, "_FOLDER", shipped.parent)
-    assert " --from tiny --updates 60" in ship_weights.command_of(made, "gaits")
-    card = ship_weights.card({**model.about, "start": model.hash}, model, 9, 9, "", True)
+    assert " --from tiny --updates 60" in cards.command_of(made, "gaits")
+    card = cards.card({**model.about, "start": model.hash}, model, 9, 9, "", True)
     assert f"| began with | weights of sha256 {model.hash} |" in card
 
 
@@ -172,6 +173,37 @@ def test_other_data_than_those_of_the_training_are_refused(ship_weights, trained
     with pytest.raises(motionlab.MotionLabError, match="was not trained on"):
         ship_weights.ship("x", trained, str(tmp_path / "fewer.npz"), tmp_path / "out", {})
     assert not (tmp_path / "out").exists()
+
+
+def test_a_dancer_ships_with_starts_and_a_card(ship_weights, tmp_path):
+    """Trained for a second on gaits that pass for a dance at 60 frames a second."""
+    from motionlab import datasets
+    from motionlab.encodings import Normalizer, RootRelative
+    from motionlab.training import PRESETS, Prepared, build, loop, prepared
+
+    motions = [m.resample(60) for m in datasets.load("gaits")[:5]]
+    encoding = RootRelative(motions[0].skeleton, 60.0)
+    clips, splits = [encoding.encode(m) for m in motions], ("train",) * 3 + ("val",) * 2
+    names = tuple(f"gaits/{m.name}_{1 + i % 2}/2" for i, m in enumerate(motions))
+    rest = (torch.cat(clips), torch.tensor([len(c) for c in clips]), names, splits)
+    normalizer = Normalizer.fit(clips)
+    digest = prepared._digest(prepared._arrays(*rest, normalizer, encoding))
+    data = Prepared(*rest, encoding, normalizer, digest)
+    data.save(tmp_path / "dance.npz")
+    preset = PRESETS["aclstm-indian"]["smoke"]
+    loop.train(build(data, preset), data, preset, tmp_path, name="aclstm-indian", accelerator="cpu")
+    path = ship_weights.ship(
+        "aclstm-tiny", tmp_path / "best.safetensors", str(tmp_path / "dance.npz"), tmp_path, {}
+    )
+    model = motionlab.load(path)
+    assert all(name.startswith("walk_1.3, ") for name in model.start_names)  # the first half
+    assert len(model.starts.frame) == len(model.start_names) > 1 and model.sampling == {}
+    assert model.generate(30, model.starts).isfinite().all()
+    half, full = (model.about["validation loss"][kind] for kind in ("half", "full"))
+    assert half != full and half == pytest.approx(full, rel=0.01)
+    for said in ("# aclstm-tiny\n", "Zhou and others", f"held-out loss | {half:.4f}", "MIT",
+                 "motionlab train aclstm-indian --preset smoke"):  # fmt: skip
+        assert said in model.card, said
 
 
 def test_starts_are_named_after_what_follows(ship_weights, gaits):

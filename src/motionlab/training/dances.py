@@ -247,7 +247,7 @@ _PRESETS = {
         schedule=40,
     ),
     "table": _TABLE,
-    "ship": replace(_TABLE, updates=40_000, width=512, snapshots=2_000, schedule=40_000),
+    "ship": replace(_TABLE, updates=30_000, decay=3_000, snapshots=2_000),
     "paper": replace(
         _TABLE, updates=500_000, validate_every=1_000, width=1024, learning_rate=1e-4, warmup=0,
         snapshots=10_000, fps=60.0, metres=True, schedule=500_000,

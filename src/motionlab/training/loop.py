@@ -13,7 +13,7 @@ import os
 import statistics
 import sys
 import time
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import torch
@@ -34,7 +34,7 @@ OPTIMIZERS = {
 }
 CHECKPOINT, BEST = "checkpoint.safetensors", "best.safetensors"
 # May change when a training goes on, as long as the updates already made would have been the same.
-_MAY_CHANGE = ("updates", "decay")
+_MAY_CHANGE = ("updates", "decay", "snapshots")
 
 
 def train(
@@ -219,7 +219,7 @@ def _check_same(path: Path, found: dict, wanted: dict, preset: type[Preset]) -> 
         was, now = (
             {key: facts[key] for key in ("name", "model", "data", "precision")}
             | {"start (--from)": facts.get("start")}
-            | asdict(replace(settings, **dict.fromkeys(_MAY_CHANGE, 1)))
+            | {key: value for key, value in asdict(settings).items() if key not in _MAY_CHANGE}
             for facts, settings in ((found, before), (wanted, after))
         )
     except (KeyError, TypeError) as error:

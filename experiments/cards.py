@@ -1,0 +1,151 @@
+"""Model cards: what shipped weights are, how they were made, and whose data are behind them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from dataclasses import asdict
+
+import torch
+from torch import nn
+
+import motionlab
+from motionlab import MotionLabError, datasets, weights
+from motionlab.training import PRESETS, Prepared
+
+PAPERS = {
+    "LstmGmm": """\
+A recurrent mixture density network (LstmGmm; Wang, Chai and Xia, *Combining Recurrent Neural Networks
+and Adversarial Training for Human Motion Synthesis and Control*, 2021, section 4.1) that goes on with
+walking and running, {fps:g} frames a second, on the canonical skeleton of motionlab: joint angles, steps
+over the ground{toes}. It is no release of the authors of the paper.""",
+    "AcLstm": """\
+An auto-conditioned recurrent network (AcLstm; Zhou and others, *Auto-Conditioned Recurrent Networks for
+Extended Complex Human Motion Synthesis*, 2018) that goes on with motion of the style in its name,
+{fps:g} frames a second, as points in space. It is no release of the authors of the paper.""",
+}
+LIMITS = {
+    "LstmGmm": """\
+Nothing steers it: it goes where it likes. It knows level ground, and no other body than the canonical
+one. Feet slide more than in its data; `motionlab evaluate {name}` measures by how much.""",
+    "AcLstm": """\
+Nothing steers it, and it draws no lots: one start has one future. It has seen a few minutes of a few
+people, and nothing keeps a bone's length. How long its dances last stands in
+`results/dances_rollouts.json` and in the book.""",
+}
+
+
+def command_of(made: dict, source: str) -> str:
+    """The command line that makes such weights again."""
+    trained = type(PRESETS[made["name"]]["ship"])(**made["preset"])
+    may_differ = ("updates", "learning_rate", "seed")
+    for title, preset in PRESETS[made["name"]].items():
+        differ = [key for key, value in asdict(preset).items() if getattr(trained, key) != value]
+        if set(differ) <= set(may_differ):
+            options = [f"--{key.replace('_', '-')} {getattr(trained, key)}" for key in differ]
+            if made.get("start"):
+                options.insert(0, f"--from {shipped_as(made['start']) or 'WEIGHTS'}")
+            command = f"motionlab train {made['name']} --preset {title} --data {source}"
+            return " ".join([command, *options])
+    raise MotionLabError("No preset of this version has the settings of these weights.")
+
+
+def shipped_as(sha256: str) -> str | None:
+    """Name of the shipped weights of this hash, if there are such."""
+    names = {hashlib.sha256(weights.find(n).read_bytes()).hexdigest(): n for n in weights.names()}
+    return names.get(sha256)
+
+
+def card(
+    about: dict, model: nn.Module, size: int, clips: int, sources: str, commercial: bool
+) -> str:
+    """The model card, in Markdown; clips: for training."""
+    kind, name = type(model).__name__, about["name"]
+    toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
+    begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
+    sampling = ", ".join(f"{key} {value:g}" for key, value in about["sampling"].items())
+    parameters = sum(parameter.numel() for parameter in model.parameters())
+    return f"""\
+# {name}
+
+{PAPERS[kind].format(fps=model.fps, toes=toes)}
+
+```python
+model = motionlab.load("{name}")
+motion = model.encoding.to_motion(model.generate(300, model.starts[0])[0])
+```
+
+| | |
+|---|---|
+| made by | `{about["command"]}` |
+| and | `{" ".join(["python", *sys.argv])}` |
+| motionlab | {motionlab.__version__}, torch {torch.__version__} |
+| updates | {about["update"]}{", the best of validation" if kind == "LstmGmm" else ""} |
+| seed | {about["preset"]["seed"]} |
+| began with | {begun} |
+| precision of the training | {about["precision"]} |
+| time until then | {about["seconds"] / 3600:.2f} h |
+| data | `{about["data_name"]}`, sha256 {about["data"]} |
+| training clips | {clips}{", half of them mirror images" if kind == "LstmGmm" else ""} |
+| size | {parameters:,} parameters in half precision, {size / 2**20:.1f} MiB |
+{_held_out(about)}
+| sampling that suits it | {sampling or "as learned"} |
+| starts | {"; ".join(about["starts"])} |
+
+## Settings of the training
+
+```json
+{json.dumps(about["preset"], indent=1)}
+```
+
+## Meant for
+
+Learning how such networks work, comparing with them, starting a training of your own (`motionlab
+train {about["model"]} --from {name}`). Not for judging how a person moves, nor for telling persons
+apart.
+
+## What it can't do
+
+{LIMITS[kind].format(name=name)}
+
+## Licence
+
+{"The licences of its data allow commercial use." if commercial else "Not for commercial use: some of its data are not."}
+Who passes these weights on names the sources:
+
+{sources}
+"""
+
+
+def _held_out(about: dict) -> str:
+    """Rows on how good it is on validation clips, and on what rounding costs."""
+    if "log_likelihood" not in about:
+        full, half = (about["validation loss"][kind] for kind in ("full", "half"))
+        return (
+            f"| held-out loss | {half:.4f}, mean squared error of a channel in deviations |\n"
+            f"| what rounding costs | {half - full:.5f} |"
+        )
+    full, half = (about["log_likelihood"][kind] for kind in ("full", "half"))
+    return (
+        f"| held-out log-likelihood | {half['value']:.3f} nats a frame [{half['low']:.3f}, "
+        f"{half['high']:.3f}] over {half['clips']} validation clips |\n"
+        f"| what rounding costs | {full['value'] - half['value']:.4f} nats a frame |"
+    )
+
+
+def licences(data: Prepared) -> tuple[str, bool]:
+    """The sources of the training clips, and whether all may be used commercially."""
+    frames: dict[str, int] = {}
+    rows = zip(data.names, data.splits, data.lengths.tolist(), strict=True)
+    for name, split, length in rows:
+        if split == "train":
+            source = name.split("/")[0]
+            frames[source] = frames.get(source, 0) + length
+    about = {source: datasets.info(source) for source in frames}
+    lines = [
+        f"* {about[source].title} (`{source}`), {100 * count / sum(frames.values()):.1f} % of the "
+        f"frames: {about[source].licence}. {about[source].citation}"
+        for source, count in sorted(frames.items(), key=lambda item: -item[1])
+    ]
+    return "\n".join(lines), all(info.commercial for info in about.values())
