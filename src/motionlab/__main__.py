@@ -236,10 +236,10 @@ class Train:
         )  # fmt: skip
         if torch.distributed.is_initialized() and torch.distributed.get_rank():
             return  # one process is enough for what is left
-        sampling = finish(out / "best.safetensors", data, preset)
+        sampling = finish(out / preset.weights, data, preset)
         best = min(curve, key=lambda point: point["val"])
         print(f"{out}: {curve[-1]['update']} updates; best of validation {best['val']:.3f} at "
-              f"update {best['update']}, in best.safetensors"
+              f"update {best['update']}; weights in {preset.weights}"
               + "".join(f"; {key} {value:g}" for key, value in sampling.items()))  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from motionlab.errors import ModelError, TrainingError
 from motionlab.models import AcLstm
 from motionlab.models.erd import noise_schedule
 from motionlab.training import PRESETS, Prepared, build, dances, loop
+from motionlab.training.checkpoints import load_weights
 from motionlab.training.dances import DanceWindows, teacher_share, turned, without_rest
 
 SMOKE = PRESETS["aclstm-indian"]["smoke"]
@@ -164,6 +165,8 @@ def test_every_method_trains_and_goes_on(data, method, tmp_path):
     again = run(tmp_path / "broken", 6)
     assert [point["val"] for point in again] == [point["val"] for point in curve]
     assert (tmp_path / "whole" / "at-4.safetensors").exists()
+    assert load_weights(tmp_path / "whole" / "last.safetensors")[1]["update"] == 6
+    assert not (tmp_path / "whole" / "best.safetensors").exists()
     assert not (tmp_path / "whole" / "at-6.safetensors").exists()
 
 

@@ -193,7 +193,7 @@ def test_a_dancer_ships_with_starts_and_a_card(ship_weights, tmp_path):
     preset = PRESETS["aclstm-indian"]["smoke"]
     loop.train(build(data, preset), data, preset, tmp_path, name="aclstm-indian", accelerator="cpu")
     path = ship_weights.ship(
-        "aclstm-tiny", tmp_path / "best.safetensors", str(tmp_path / "dance.npz"), tmp_path, {}
+        "aclstm-tiny", tmp_path / "last.safetensors", str(tmp_path / "dance.npz"), tmp_path, {}
     )
     model = motionlab.load(path)
     assert all(name.startswith("walk_1.3, ") for name in model.start_names)  # the first half

@@ -21,7 +21,7 @@ from ..errors import TrainingError
 from ..models import AcLstm, Erd, Seq2Seq, auto_condition
 from ..models.erd import noise_schedule
 from .prepared import DANCES, Prepared
-from .presets import Preset
+from .presets import LAST, Preset
 
 Method = Literal["lstm-3lr", "erd", "seq2seq"]
 Feeding = Literal["teacher", "auto", "scheduled"]
@@ -147,6 +147,12 @@ class DancePreset(Preset):
                 f"fps must be positive, tempo from 0 to less than 1, schedule 1 or more: {self}."
             )
         auto_condition(1, self.real, self.fed)
+
+    @property
+    def weights(self) -> str:
+        """The file that a training is for: the last weights. The next frame of another dance is
+        foretold best long before the network knows how to dance."""
+        return LAST
 
     def windows(self, data: Prepared, split: str) -> DanceWindows:
         """The windows of a split; of its clips as they are if they are for validation."""

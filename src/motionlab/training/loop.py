@@ -24,7 +24,7 @@ from tqdm import tqdm
 from ..errors import DivergedError, TrainingError
 from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
 from .prepared import Prepared
-from .presets import Preset
+from .presets import LAST, Preset
 from .windows import Windows
 
 OPTIMIZERS = {
@@ -32,7 +32,7 @@ OPTIMIZERS = {
     "rmsprop": torch.optim.RMSprop,
     "sgd": lambda parameters, lr: torch.optim.SGD(parameters, lr, momentum=0.9),
 }
-CHECKPOINT, BEST = "checkpoint.safetensors", "best.safetensors"
+CHECKPOINT = "checkpoint.safetensors"
 # May change when a training goes on, as long as the updates already made would have been the same.
 _MAY_CHANGE = ("updates", "decay", "snapshots")
 
@@ -58,8 +58,8 @@ def train(
     model : has ``loss(windows, **extras)``, the mean over (batch, frames, dim) windows; extras
         are what the preset's `extras` gives, such as noise.
     folder : receives ``checkpoint.safetensors`` (to go on from), ``best.safetensors`` (weights with
-        the lowest validation loss) and ``curve.json`` at every validation, and
-        ``at-UPDATE.safetensors`` where the preset asks for snapshots.
+        the lowest validation loss; with a preset of dances ``last.safetensors``) and ``curve.json``
+        at every validation, and ``at-UPDATE.safetensors`` where the preset asks for snapshots.
     name : of the model, kept with its weights.
     start : file of the weights that the model begins with, as `build` was given it; None if it
         begins anew. Its sha256 is kept with the weights.
@@ -199,8 +199,8 @@ def _keep(
 ) -> None:
     """Write what the last validation brought. Killed in between, it is done once more."""
     curve = facts["curve"]
-    if _is_best(curve):
-        save_weights(folder / BEST, model, facts)
+    if _is_best(curve) or preset.weights == LAST:
+        save_weights(folder / preset.weights, model, facts)
     if preset.snapshots and facts["update"] % preset.snapshots == 0:
         save_weights(folder / f"at-{facts['update']}.safetensors", model, facts)
     path = folder / "curve.json"

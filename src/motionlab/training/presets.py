@@ -16,6 +16,7 @@ from .prepared import Prepared
 from .windows import Windows
 
 Optimizer = Literal["adam", "rmsprop", "sgd"]
+BEST, LAST = "best.safetensors", "last.safetensors"
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,11 @@ class Preset:
         rise = (update + 1) / (self.warmup + 1)
         fall = (self.updates - update) / (self.decay + 1)
         return self.learning_rate * min(1.0, rise, fall) * self.shrink**update
+
+    @property
+    def weights(self) -> str:
+        """The file that a training is for: the weights that were best in validation."""
+        return BEST
 
     def windows(self, data: Prepared, split: str) -> Windows:
         """Where the windows of a split come from."""
