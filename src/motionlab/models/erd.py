@@ -87,6 +87,8 @@ class Erd(nn.Module):
     ) -> Tensor:
         """The frame after each of features (batch, frames, dim), from no memory; like features.
 
+        Parameters
+        ----------
         noise : like features; added to recorded frames where they are input, in normalised units.
         real : (frames,) or (batch, frames) bool; where it is False, the network sees its own output
             instead of the recorded frame. The first must be True.
