@@ -22,7 +22,8 @@ def trained():
     adam = torch.optim.Adam(model.parameters(), 3e-3)
     for update in range(100):
         adam.zero_grad()
-        model.loss(*draw(windows, preset, update)).backward()
+        batch, extras = draw(windows, preset, update)
+        model.loss(batch, **extras).backward()
         adam.step()
     clips = torch.stack([clip[20:30] for clip in data.clips("val")[:6]]).double()
     return model.double().eval(), clips
