@@ -13,6 +13,10 @@ import pytest
 if folder := os.environ.get("MOTIONLAB_DATA"):  # some tests run elsewhere
     os.environ["MOTIONLAB_DATA"] = str(Path(folder).resolve())
 
+# Two processes with two threads each take turns on two cores, and wait for each other: half as fast.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # torch reads it when it is imported
+
 SOURCES = ("accad", "aclstm-cmu", "bandai-actions", "bandai-locomotion", "cmu")
 EXPERIMENTS = Path(__file__).parents[1] / "experiments"
 
