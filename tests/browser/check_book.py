@@ -17,7 +17,7 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
@@ -291,13 +291,13 @@ def own_weight(loaded: set[str], base: str, folder: Path) -> int:
     return sum(path.stat().st_size for path in own if path.is_file())
 
 
-def check(folder: Path, sizes: Sequence[tuple[int, int]] = (DESKTOP, PHONE)) -> list[str]:
-    """All troubles of the book in this folder, in windows of these sizes, one line each."""
+def check(folder: Path) -> list[str]:
+    """All troubles of the book in this folder, one line each."""
     troubles = []
     pages = sorted(p for p in folder.rglob("*.html") if "_static" not in p.parts)
     with local_server(folder) as server, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
-        for base, (width, height) in product((folder.as_uri() + "/", server), sizes):
+        for base, (width, height) in product((folder.as_uri() + "/", server), (DESKTOP, PHONE)):
             window = browser.new_context(viewport={"width": width, "height": height})
             where = f"{base.split(':')[0]}, {width} px"
             troubles += [f"{where}: search: {t}" for t in check_search(window, base)]
