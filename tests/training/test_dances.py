@@ -13,7 +13,7 @@ from motionlab.encodings import Normalizer, RootRelative
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import AcLstm
 from motionlab.models.erd import noise_schedule
-from motionlab.training import PRESETS, Prepared, build, dances, loop
+from motionlab.training import PRESETS, Prepared, build, dances, loop, prepare
 from motionlab.training.checkpoints import load_weights
 from motionlab.training.dances import DanceWindows, teacher_share, turned, without_rest
 
@@ -207,7 +207,7 @@ def test_what_can_not_be_trained(data, encoding):
 
 def test_the_dances_are_there(real_clips):
     for style, count in {"martial": 8, "indian": 7, "hybrid": 35}.items():
-        data = Prepared.find(style)
+        data = prepare(style)
         halves = [name for name in data.names if name.endswith("/2")]
         names = {name.rpartition("_")[0] if name in halves else name for name in data.names}
         assert len(names) == count
