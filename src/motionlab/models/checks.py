@@ -17,6 +17,8 @@ class _Model(Protocol):
     encoding: Encoding
     normalizer: Normalizer
 
+    def zero_state(self, batch: int = 1) -> State: ...
+
 
 def check_normalizer(encoding: Encoding, normalizer: Normalizer) -> None:
     """Raise ModelError if a normaliser is for another number of channels than an encoding's."""
@@ -41,22 +43,15 @@ def checked_features(model: _Model, features: Tensor) -> Tensor:
     return features
 
 
-def checked_start(
-    model: _Model,
-    n: int,
-    start: State,
-    memory: tuple[int, int],
-    cell: tuple[int, int] | None = None,
-) -> State:
+def checked_start(model: _Model, n: int, start: State) -> State:
     """The state, on the model's device and in its precision, from which n frames can be generated.
 
-    memory : (layers, width) of the model's own states; cell : that of C, if it is another. Raises
-    ModelError.
+    It must have the shapes of the model's `zero_state`. Raises ModelError.
     """
     if not isinstance(n, Integral) or n < 1:
         raise ModelError(f"generate: {n!r} frames; ask for 1 or more.")
-    shapes = (model.encoding.dim,), memory, memory if cell is None else cell
-    if not isinstance(start, State) or tuple(part.shape[1:] for part in start) != shapes:
+    shapes = [part.shape[1:] for part in model.zero_state()]
+    if not isinstance(start, State) or [part.shape[1:] for part in start] != shapes:
         raise ModelError("generate: start is no state of this model; `observe` gives one.")
     if not all(part.isfinite().all() for part in start):
         raise ModelError("generate: start holds a NaN or infinite value.")

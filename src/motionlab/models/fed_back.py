@@ -13,14 +13,14 @@ from ..errors import ModelError
 Memory = TypeVar("Memory")
 
 
-def checked_real(real: Tensor | None, features: Tensor) -> Tensor:
+def checked_real(real: Tensor | None, features: Tensor) -> Tensor | None:
     """Which frames (batch, frames) of features (batch, frames, dim) are input as they were recorded.
 
-    real : (frames,) or (batch, frames) bool; None: all. Raises ModelError.
+    real : (frames,) or (batch, frames) bool; None, which stays None: all. Raises ModelError.
     """
-    batch, frames = features.shape[:2]
     if real is None:
-        return torch.ones(batch, frames, dtype=torch.bool, device=features.device)
+        return None
+    batch, frames = features.shape[:2]
     real = torch.as_tensor(real, device=features.device)
     if real.dtype != torch.bool or real.shape not in ((frames,), (batch, frames)):
         raise ModelError(
@@ -36,7 +36,7 @@ def checked_real(real: Tensor | None, features: Tensor) -> Tensor:
 def feed_back(
     run: Callable[[Tensor, Memory], tuple[Tensor, Memory]],
     inputs: Tensor,
-    real: Tensor,
+    real: Tensor | None,
     memory: Memory,
 ) -> tuple[Tensor, Memory]:
     """Outputs (batch, frames, dim) after each frame, and the memory after the last.
@@ -52,7 +52,7 @@ def feed_back(
     memory : before the first frame.
     """
     frames, outputs, first = inputs.shape[1], [], 0
-    recorded = real.all(0).tolist()
+    recorded = [True] * frames if real is None else real.all(0).tolist()
     while first < frames:
         # as many frames at once as are known beforehand
         last = first + 1

@@ -35,6 +35,11 @@ class _Floor(nn.Module):
         """Frames per second of the features."""
         return self.encoding.fps
 
+    def zero_state(self, batch: int = 1) -> State:
+        """The state after frames of zeros."""
+        frames = self.normalizer.mean.new_zeros(batch, self.memory, self.encoding.dim)
+        return State(frames[:, -1], frames, frames[:, :0])
+
     def observe(self, features: Tensor) -> State:
         """The state after features (batch, frames, dim), or (frames, dim) for a batch of one.
 
@@ -51,8 +56,7 @@ class _Floor(nn.Module):
 
     def generate(self, n: int, start: State, *, generator: torch.Generator | None = None) -> Tensor:
         """n frames (batch, n, dim) after those that a state has seen; raises ModelError."""
-        dim = self.encoding.dim
-        start = checked_start(self, n, start, (self.memory, dim), cell=(0, dim))
+        start = checked_start(self, n, start)
         times = torch.arange(1, n + 1).to(start.frame)[:, None]  # in frames
         return self._go_on(start.hidden, times)
 

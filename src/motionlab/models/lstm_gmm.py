@@ -13,10 +13,10 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from .. import encodings
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
-from .checks import check_normalizer, checked_features, checked_start
+from .checks import checked_features, checked_start
+from .recurrent import Recurrent
 from .sampler import PRECISIONS, choose, normal, unroll
 from .state import State
 
@@ -64,7 +64,7 @@ class Mixture(NamedTuple):
         return mean + temperature * std * normal(std, generator)
 
 
-class LstmGmm(nn.Module):
+class LstmGmm(Recurrent):
     """FC - FC - LSTM - LSTM - FC (RNN-GAN, fig. 3): the distribution of the next frame.
 
     Why a distribution? From one pose a person may go on in many ways. A network that must name one
@@ -90,6 +90,8 @@ class LstmGmm(nn.Module):
         the data: each frame may be a little further off, without end.
     """
 
+    settings = ("width", "components", "skip")
+
     def __init__(
         self,
         encoding: Encoding,
@@ -98,12 +100,10 @@ class LstmGmm(nn.Module):
         components: int = 5,
         skip: float = 0.0,
     ) -> None:
-        super().__init__()
-        check_normalizer(encoding, normalizer)
+        super().__init__(encoding, normalizer, width)
         if not isinstance(skip, Real) or not 0 <= skip <= 1:
             raise ModelError(f"skip is {skip!r}; it must be a share, from 0 to 1.")
-        self.encoding, self.normalizer = encoding, normalizer
-        self.width, self.components, self.kept = width, components, len(normalizer.kept)
+        self.components = components
         # What is left for the network to say is about so large; it counts in this unit, so that it
         # need not learn first how small its words are to be.
         self.skip, self.reach = skip, max(1 - skip, 0.1)
@@ -116,11 +116,6 @@ class LstmGmm(nn.Module):
         if "contacts" in encoding.slices:
             floor[encoding.slices["contacts"]] = _CONTACT_FLOOR
         self.register_buffer("floor", floor[normalizer.kept])
-
-    @property
-    def fps(self) -> float:
-        """Frames per second of the features."""
-        return self.encoding.fps
 
     # -- likelihood of whole clips ----------------------------------------------------------------
 
@@ -171,16 +166,7 @@ class LstmGmm(nn.Module):
 
     # -- one frame after the other ----------------------------------------------------------------
 
-    def zero_state(self, batch: int = 1) -> State:
-        """The state of a network that has seen nothing; its frame is the mean frame."""
-        mean = self.normalizer.mean
-        memory = mean.new_zeros(batch, 2, self.width)
-        return State(mean.expand(batch, -1), memory, memory)
-
-    def observe(self, features: Tensor) -> State:
-        """The state after features (batch, frames, dim), or (frames, dim) for a batch of one."""
-        features = torch.as_tensor(features)
-        features = checked_features(self, features[None] if features.ndim == 2 else features)
+    def _seen(self, features: Tensor) -> State:
         return self._run(features, self.zero_state(len(features)), None)[1]
 
     def predict(self, state: State) -> Mixture:
@@ -230,7 +216,7 @@ class LstmGmm(nn.Module):
             is negative, the state is another model's or holds a NaN, the generator is on another
             device, or the precision is none of the three or not possible here.
         """
-        start = checked_start(self, n, start, (2, self.width))
+        start = checked_start(self, n, start)
         for what, value in [("temperature", temperature), ("component_temperature",
                             component_temperature)]:  # fmt: skip
             if not isinstance(value, Real) or not 0 < value < math.inf:
@@ -270,22 +256,3 @@ class LstmGmm(nn.Module):
             normalized = mixture.sample(generator, temperature, component_temperature)
             frames.append(self.normalizer.inverse(normalized))
         return torch.stack(frames, dim=1)
-
-    # -- what is stored with the weights ----------------------------------------------------------
-
-    def config(self) -> dict:
-        """What `from_config` needs to build an untrained copy; fit for JSON."""
-        return {
-            "encoding": self.encoding.config(),
-            "kept": self.kept,
-            "width": self.width,
-            "components": self.components,
-            "skip": self.skip,
-        }
-
-    @classmethod
-    def from_config(cls, config: dict) -> LstmGmm:
-        """A model of the right shapes, to be filled by `load_state_dict`."""
-        encoding = encodings.from_config(config["encoding"])
-        normalizer = Normalizer(encoding.dim, config["kept"])
-        return cls(encoding, normalizer, config["width"], config["components"], config["skip"])

@@ -63,7 +63,9 @@ class _Unroll(torch.autograd.Function):
             for layer, (weight, bias) in enumerate(gates):
                 torch.addmm(bias, seen[layer][t], weight.T, out=opened[layer][t])
                 enter, keep, new, show = opened[layer][t].chunk(4, -1)
-                enter.sigmoid_(), keep.sigmoid_(), new.tanh_(), show.sigmoid_()
+                new.tanh_()
+                for gate in (enter, keep, show):
+                    gate.sigmoid_()
                 torch.addcmul(keep * cells[layer, t], enter, new, out=cells[layer, t + 1])
                 h = (cells[layer, t + 1].tanh() * show).to(show.dtype)
                 seen[layer][t + 1, :, -width:] = h
@@ -122,7 +124,7 @@ class _Unroll(torch.autograd.Function):
                 fed = to_inputs[t] * from_itself
                 to_inputs[t].masked_fill_(from_itself, 0)
         flat = []
-        for what, into in ((*pair,) for pair in zip(blamed, seen, strict=True)):
+        for what, into in zip(blamed, seen, strict=True):
             what = what.flatten(0, 1)
             flat += [what.T @ into[:frames].flatten(0, 1), what.sum(0)]
         rows = to_outputs.flatten(0, 1)
