@@ -135,7 +135,9 @@ _LSTM_GMM = {
     "smoke": MixturePreset(
         updates=40, decay=10, batch=8, frames=16, validate_every=10, width=32, warmup=5
     ),
-    "table": MixturePreset(updates=3_000, decay=600, batch=32, frames=64, validate_every=200, width=256),
+    "table": MixturePreset(
+        updates=3_000, decay=600, batch=32, frames=64, validate_every=200, width=128
+    ),
     "ship": MixturePreset(
         updates=10_000, decay=3_000, batch=32, frames=64, validate_every=200, width=256
     ),
