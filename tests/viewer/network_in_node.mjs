@@ -46,6 +46,14 @@ const answers = {
     return { points, contacts, inputs: disturbed };
   },
 
+  /** A frame after one that was no number. */
+  explosion({ name }) {
+    const dreamer = new Dreamer(weights(name), look, settings);
+    dreamer.characters[0].next.means.fill(NaN);
+    for (let frame = 0; frame < 2; frame++) dreamer.advance();
+    return { exploded: dreamer.exploded, points: list(dreamer.tracks[0].room(2)) };
+  },
+
   draws({ mixture, count, change }) {
     const random = new Random(7);
     const kept = mixture.means.length / mixture.logWeights.length;

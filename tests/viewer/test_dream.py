@@ -132,6 +132,11 @@ def test_the_seed_decides_and_characters_differ(ask):
     assert np.abs(three[-1, 0] - three[-1, 1]).max() > 1e-3
 
 
+def test_a_motion_that_fell_apart_begins_again_and_is_counted(ask):
+    said = ask("explosion")
+    assert said["exploded"] == 1 and np.isfinite(said["points"]).all()
+
+
 def test_noise_disturbs_what_the_network_sees_not_what_is_shown(model, ask):
     said = ask("dream", frames=200, change={**WARMTH, "noise": 0.2})
     calm = ask("dream", frames=200, change=WARMTH)

@@ -62,6 +62,8 @@ class Evaluate:
         print(f"{'':28} {f'{found.starts} samples':22} {self.split}")
         for metric, real in found.data.items():
             print(f"{metric:28} {found.samples.get(metric, 'none lasted')!s:22} {real}")
+        if sampling:
+            print("\nsampled with " + ", ".join(f"{k} {v:g}" for k, v in sampling.items()))
         print(f"\nfrozen {found.frozen}, diverged {found.diverged} of {found.starts} within "
               f"{self.seconds:g} s")  # fmt: skip
         if self.out is None:

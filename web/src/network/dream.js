@@ -63,14 +63,15 @@ export class Dream {
 
   /** What a frame costs, and whether they keep up with the clock. */
   tellCost() {
-    const { cost, last, settings, fps, network } = this.dreamer;
+    const { cost, last, settings, fps, network, exploded } = this.dreamer;
     const made = last - (this.told ?? last);
     this.told = last;
     if (!cost || !this.player.playing || made <= 0) return;
     const many = settings.characters > 1 ? ` of ${settings.characters} characters` : "";
     const slow = made < 0.8 * fps * this.player.speed ? ` This machine is busy: ${made} frames a second instead of ${fps * this.player.speed}.` : "";
     const same = many && network.certain && !settings.noise ? " Without noise a start has one future: all do the same." : "";
-    this.say(`Runs here, in this page: ${cost.toFixed(1)} ms for a frame${many}.${same}${slow}`);
+    const fallen = exploded ? ` A motion fell apart and began again: ${exploded} so far.` : "";
+    this.say(`Runs here, in this page: ${cost.toFixed(1)} ms for a frame${many}.${same}${fallen}${slow}`);
   }
 
   say(text) {

@@ -30,6 +30,7 @@ export class Dreamer {
   /** Begin anew; the same settings give the same motion. */
   restart() {
     this.last = 0; // the newest frame
+    this.exploded = 0; // times that a character had to begin again
     this.characters = [];
     this.tracks.length = 0;
     this.populate();
@@ -71,7 +72,10 @@ export class Dreamer {
     this.last++;
     this.characters.forEach((character, k) => {
       const row = this.denormalize(drawn[k]);
-      if (!row.every(Number.isFinite)) return this.enter(k); // it has exploded: begin again
+      if (!row.every(Number.isFinite)) {
+        this.exploded++;
+        return this.enter(k);
+      }
       character.next = next[k];
       character.place = this.encoding.walk(character.place, row);
       this.show(character, row);
