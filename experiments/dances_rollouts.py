@@ -43,6 +43,10 @@ TAIL = 10.0  # seconds before, of which they are compared
 LASTING = 1.0  # seconds for which a body that is only points must have diverged
 ELASTIC = "if bones may have any length"  # told beside what the claims ask
 POINTS = 60  # of a curve over frames
+STRIP, POSES = (
+    4.0,
+    8,
+)  # seconds before the latest failure, and poses, that are kept for a film strip
 GIVEN_AWAY = 2.0  # seconds from one window of a rollout to the next that is looked for in the data
 
 
@@ -184,6 +188,7 @@ class Rollout(NamedTuple):
     sound: int  # frames until it diverged
     period: float  # of the loop on which it ends
     head: Tensor  # points of its first minute
+    strip: Tensor  # ... of some moments before it failed, or of the first `SHORT` frames' last ones
     tails: dict[float, Tensor]  # ... of the seconds before some times
 
     @property
@@ -207,10 +212,13 @@ def judged(features: Tensor, encoding, real: Real) -> Rollout:
     minute, tail = round(60 * fps), round(TAIL * fps)
     if sound == frames and frames >= 4 * fps:
         period = metrics.loop(points[-minute:], skeleton, fps, real.tolerance).period
+    short = min(judge.failures(points[:SHORT]).values())
+    last = min(until(short), SHORT, frames) - 1
+    moments = torch.linspace(last - STRIP * fps, last, POSES).round().long().clamp(0)
     ends = [m * minute for m in MINUTES if m * minute <= frames] + [frames]
     return Rollout(
-        failures, whole, min(judge.failures(points[:SHORT]).values()), change, pauses, sound, period,
-        points[:minute].clone(),
+        failures, whole, short, change, pauses, sound, period,
+        points[:minute].clone(), points[moments],
         {end / fps: points[max(0, end - tail) : end].clone() for end in ends},
     )  # fmt: skip
 
@@ -251,6 +259,8 @@ def told(model: nn.Module, real: Real, seeds: Tensor, frames: int) -> dict:
         f"first {SHORT} frames": {
             "failed": int(np.isfinite(short).sum()),
             "mean seconds until failure": float(short.clip(max=min(frames, SHORT) / fps).mean()),
+            "latest (s)": float(short.max()),
+            "poses before the latest (m)": each[int(short.argmax())].strip.tolist(),
         },
         "change": change_over_time([one.change[: max(0, one.sound - 1)] for one in each], frames, fps),
         "real change (m/s)": real.change,

@@ -117,6 +117,10 @@ def test_a_stretched_bone_is_a_divergence_and_what_would_be_without_is_told(scri
     other = found[script.ELASTIC]
     assert other["alive"] == 1 and other["failed"]["diverged"] == 0
     assert found["change"]["over real"][-1] is None and other["change"]["over real"][-1] > 0
+    brief = found["first 1000 frames"]
+    assert brief["latest (s)"] == max(found["failed (s)"])
+    poses = np.array(brief["poses before the latest (m)"])
+    assert poses.shape[0] == script.POSES and np.abs(poses[-1] - poses[0]).max() > 0.1
 
 
 def test_a_stop_that_ends_is_a_stagnation_and_not_a_freeze(tell, walk):
