@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 import sys
 from dataclasses import asdict
 
@@ -58,12 +59,20 @@ def shipped_as(sha256: str) -> str | None:
 
 
 def card(
-    about: dict, model: nn.Module, size: int, clips: int, sources: str, commercial: bool
+    about: dict,
+    model: nn.Module,
+    size: int,
+    clips: int,
+    minutes: float,
+    sources: str,
+    commercial: bool,
+    remark: str = "",
 ) -> str:
-    """The model card, in Markdown; clips: for training."""
+    """The model card, in Markdown; clips, minutes: of training motion; remark: on what it can't do."""
     kind, name = type(model).__name__, about["name"]
     toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
     begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
+    mirrored = ", half of them mirror images" if kind == "LstmGmm" else ""
     sampling = ", ".join(f"{key} {value:g}" for key, value in about["sampling"].items())
     parameters = sum(parameter.numel() for parameter in model.parameters())
     return f"""\
@@ -79,7 +88,7 @@ motion = model.encoding.to_motion(model.generate(300, model.starts[0])[0])
 | | |
 |---|---|
 | made by | `{about["command"]}` |
-| and | `{" ".join(["python", *sys.argv])}` |
+| and | `{" ".join(["python", shlex.join(sys.argv)])}` |
 | motionlab | {motionlab.__version__}, torch {torch.__version__} |
 | updates | {about["update"]}{", the best of validation" if kind == "LstmGmm" else ""} |
 | seed | {about["preset"]["seed"]} |
@@ -87,7 +96,7 @@ motion = model.encoding.to_motion(model.generate(300, model.starts[0])[0])
 | precision of the training | {about["precision"]} |
 | time until then | {about["seconds"] / 3600:.2f} h |
 | data | `{about["data_name"]}`, sha256 {about["data"]} |
-| training clips | {clips}{", half of them mirror images" if kind == "LstmGmm" else ""} |
+| training clips | {clips}, {minutes:.1f} minutes{mirrored} |
 | size | {parameters:,} parameters in half precision, {size / 2**20:.1f} MiB |
 {_held_out(about)}
 | sampling that suits it | {sampling or "as learned"} |
@@ -107,7 +116,7 @@ apart.
 
 ## What it can't do
 
-{LIMITS[kind].format(name=name)}
+{LIMITS[kind].format(name=name)}{remark and f" {remark}"}
 
 ## Licence
 

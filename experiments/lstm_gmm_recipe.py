@@ -57,7 +57,6 @@ ROWS = (
     Row("pretrained", "then the one actor", data="actor", first="everything else", share=0.25),
     Row("scratch", "the one actor alone, as many updates in all", data="actor", share=1.25),
     Row("30 fps", "clips recorded at 120 frames a second, thinned to 30", data="30"),
-    Row("skip 1", "means are the present frame plus a change", {"skip": 1.0}),
     Row("120 fps", "the same clips as they were recorded", data="120"),
 )  # fmt: skip
 

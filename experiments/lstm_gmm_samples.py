@@ -81,15 +81,15 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def variety(
-    model: nn.Module, data: Prepared, judge: Judge, seed: int, sampling: dict
+    model: nn.Module, data: Prepared, judge: Judge, seed: int, sampling: dict, split: str = "test"
 ) -> dict[str, dict]:
     """How samples from one start differ, beside how people do who do one thing again."""
     fps, about = model.fps, {f"{c.source}/{c.name}": c for c in choose("locomotion")}
     seen, after = round(OBSERVED * fps), round(AFTER * fps)
     points = model.encoding.positions
     clips = [
-        (about[name], split, clip)  # mirrored ones are in no table
-        for name, split, clip in zip(
+        (about[name], its_split, clip)  # mirrored ones are in no table
+        for name, its_split, clip in zip(
             data.names, data.splits, data.features.split(data.lengths.tolist()), strict=True
         )
         if name in about
@@ -98,16 +98,16 @@ def variety(
     for gait, (actions, seconds) in GAITS.items():
         piece = round(seconds * fps)
         real = defaultdict(list)
-        for clip_of, split, clip in clips:
-            if split == "train" and len(clip) >= piece:
+        for clip_of, its_split, clip in clips:
+            if its_split == "train" and len(clip) >= piece:
                 key = clip_of.source, clip_of.action, clip_of.style
                 real[key].append(quantities(points(clip[:piece]), judge))
         everything = np.concatenate(list(map(np.array, real.values())))
         least, most = np.nanmin(everything, 0), np.nanmax(everything, 0)
         held = [
             (float(metrics.speed(points(clip), fps).mean()), clip_of.name, clip)
-            for clip_of, split, clip in clips
-            if split == "test" and clip_of.action.startswith(actions)
+            for clip_of, its_split, clip in clips
+            if its_split == split and clip_of.action.startswith(actions)
         ]
         speed, name, start = sorted(held, key=lambda h: h[0])[len(held) // 2]
         begun = start[:seen].expand(SAMPLES, -1, -1)

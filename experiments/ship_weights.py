@@ -40,17 +40,22 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--temperature", type=float, help="for samples, if not the one that fits")
     for option in ("component-temperature", "noise"):
         parser.add_argument(f"--{option}", type=float, help="for samples, if others than 1, 0")
+    parser.add_argument("--remark", default="", help="what else it can't do, for the card")
     chosen = parser.parse_args(arguments)
     sampling = {
         key: getattr(chosen, key) for key in ("temperature", "component_temperature", "noise")
     }
     sampling = {key: value for key, value in sampling.items() if value is not None}
     style = chosen.name.rpartition("-")[2] if chosen.name.startswith("aclstm") else "locomotion"
-    path = ship(chosen.name, chosen.weights, chosen.data or style, chosen.folder, sampling)
+    path = ship(
+        chosen.name, chosen.weights, chosen.data or style, chosen.folder, sampling, chosen.remark
+    )
     print(path.with_suffix(".md").read_text(encoding="utf-8"))
 
 
-def ship(name: str, file: Path, source: str, folder: Path, sampling: dict[str, float]) -> Path:
+def ship(
+    name: str, file: Path, source: str, folder: Path, sampling: dict[str, float], remark: str = ""
+) -> Path:
     """Write NAME.safetensors and NAME.md; returns the path of the weights."""
     data = Prepared.find(source)
     model, made = load_weights(file)
@@ -79,7 +84,9 @@ def ship(name: str, file: Path, source: str, folder: Path, sampling: dict[str, f
     }
     path = folder / f"{name}.safetensors"
     save_weights(path, halved, about, starts=state, half=True)
-    text = card(about, halved, path.stat().st_size, data.splits.count("train"), *licence)
+    clips = data.clips("train")
+    minutes = sum(map(len, clips)) / data.encoding.fps / 60
+    text = card(about, halved, path.stat().st_size, len(clips), minutes, *licence, remark)
     write_whole(path.with_suffix(".md"), lambda stream: stream.write(text.encode()))
     return path
 

@@ -156,7 +156,7 @@ def test_card_says_what_a_training_began_with(model, shipped, experiment, monkey
     assert " --from WEIGHTS --updates 60" in cards.command_of(made, "gaits")
     monkeypatch.setattr(weights, "_FOLDER", shipped.parent)
     assert " --from tiny --updates 60" in cards.command_of(made, "gaits")
-    card = cards.card({**model.about, "start": model.hash}, model, 9, 9, "", True)
+    card = cards.card({**model.about, "start": model.hash}, model, 9, 9, 1.0, "", True)
     assert f"| began with | weights of sha256 {model.hash} |" in card
 
 
