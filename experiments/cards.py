@@ -82,7 +82,8 @@ def card(
 
 ```python
 model = motionlab.load("{name}")
-motion = model.encoding.to_motion(model.generate(300, model.starts[0])[0])
+features = model.generate(300, model.starts[0], **model.sampling)
+motion = model.encoding.to_motion(features[0])
 ```
 
 | | |

@@ -180,7 +180,7 @@ def _rows(
         outcomes[measure] = compare(values[claimed], values[other], least)
         for row, found in values.items():
             numbers[f"{measure}, {row}"] = ", ".join(f"{value:.3g}" for value in found)
-        numbers[measure] = outcomes[measure]
+        numbers[f"{measure}: {claimed} is"] = outcomes[measure]
     return Verdict(rule(outcomes), numbers)
 
 

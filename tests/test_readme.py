@@ -17,15 +17,16 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
 
 
-def test_the_example_runs(tmp_path, monkeypatch, capsys):
+def test_the_examples_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (example,) = blocks("python")
     names = {}
-    exec(compile(example, "README.md", "exec"), names)
+    for example in blocks("python"):
+        exec(compile(example, "README.md", "exec"), names)
     out = capsys.readouterr().out
     assert "300 frames, 10.00 s, 30 fps" in out
     travelled = float(re.search(r"travel ([\d.]+) m", out)[1])
     assert travelled == pytest.approx(14, rel=0.05)  # 10 s at 1.4 m/s
+    assert names["features"].shape[:2] == (1, 300) and names["model"].start_names[2]
     import motionlab as ml
 
     written = ml.read_bvh("mirrored.bvh")

@@ -1,7 +1,7 @@
 """Trained models that ship with motionlab, each a file of weights and its card.
 
     model = motionlab.load("lstm-gmm")
-    features = model.generate(300, model.starts[2])
+    features = model.generate(300, model.starts[2], **model.sampling)
 
 No data are needed. `experiments/ship_weights.py` makes the files.
 """
