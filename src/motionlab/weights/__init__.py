@@ -1,4 +1,4 @@
-"""Trained models that ship with motionlab, each a file of weights and its card.
+"""Trained models that ship with motionlab, each a file of weights and its card::
 
     model = motionlab.load("lstm-gmm")
     features = model.generate(300, model.starts[2], **model.sampling)
