@@ -89,7 +89,7 @@ motion = model.encoding.to_motion(features[0])
 | | |
 |---|---|
 | made by | `{about["command"]}` |
-| and | `{" ".join(["python", shlex.join(sys.argv)])}` |
+| and | `{shlex.join(["python", *sys.argv])}` |
 | motionlab | {motionlab.__version__}, torch {torch.__version__} |
 | updates | {about["update"]}{", the best of validation" if kind == "LstmGmm" else ""} |
 | seed | {about["preset"]["seed"]} |

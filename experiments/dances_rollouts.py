@@ -43,10 +43,7 @@ TAIL = 10.0  # seconds before, of which they are compared
 LASTING = 1.0  # seconds for which a body that is only points must have diverged
 ELASTIC = "if bones may have any length"  # told beside what the claims ask
 POINTS = 60  # of a curve over frames
-STRIP, POSES = (
-    4.0,
-    8,
-)  # seconds before the latest failure, and poses, that are kept for a film strip
+STRIP, POSES = 4.0, 8  # of a film strip before the latest failure: seconds, and poses
 GIVEN_AWAY = 2.0  # seconds from one window of a rollout to the next that is looked for in the data
 
 

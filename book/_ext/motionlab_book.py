@@ -9,7 +9,7 @@ from sphinx.util import logging
 from motionlab.viewer import bundle_path
 from motionlab.viewer.scene_page import write_viewer
 
-CHAPTER_SECONDS, SLOW = 150, 2  # budget of a chapter; how much slower a shared machine may be
+CHAPTER_SECONDS = 150
 
 # Search reads each found page for an excerpt; browsers forbid that to a page opened from disk.
 SEARCH_FROM_DISK = (
@@ -52,10 +52,10 @@ def copy_scripts(app: Sphinx, error) -> None:
 
 
 def check_time(app: Sphinx, env) -> None:
-    """A chapter that takes far too long to execute fails the (strict) build."""
+    """A chapter that takes too long to execute fails the (strict) build."""
     for page, data in env.nb_metadata.items():
         seconds = data.get("exec_data", {}).get("runtime") or 0
-        if seconds > SLOW * CHAPTER_SECONDS:
+        if seconds > CHAPTER_SECONDS:
             logging.getLogger(__name__).warning(
                 "%s took %.0f s; a chapter has %d s", page, seconds, CHAPTER_SECONDS, location=page
             )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from numbers import Integral
+import math
+from numbers import Integral, Real
 from typing import Protocol
 
 import torch
@@ -56,3 +57,9 @@ def checked_start(model: _Model, n: int, start: State) -> State:
     if not all(part.isfinite().all() for part in start):
         raise ModelError("generate: start holds a NaN or infinite value.")
     return State(*(part.to(model.normalizer.mean) for part in start))
+
+
+def check_noise(noise: float) -> None:
+    """Raise ModelError if this is no standard deviation."""
+    if not isinstance(noise, Real) or not 0 <= noise < math.inf:
+        raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")

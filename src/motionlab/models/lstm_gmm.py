@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
-from .checks import checked_features, checked_start
+from .checks import check_noise, checked_features, checked_start
 from .recurrent import Recurrent
 from .sampler import PRECISIONS, choose, normal, unroll
 from .state import State
@@ -205,8 +205,8 @@ class LstmGmm(Recurrent):
         component_temperature : the same for the choice among the M components.
         noise : standard deviation of what is added to the network's inputs, in normalised units
             (the d of section 5.1; 0.05 in training).
-        precision : of the weights. "full" is theirs. "half" draws one or a few characters in about
-            half the time, "int8" hundreds (it rounds what is multiplied, too): nearly the same
+        precision : of the weights. "full" is theirs. "half" draws one or a few characters
+            faster, "int8" hundreds (it rounds what is multiplied, too): nearly the same
             distribution, another motion. Both only in ``torch.no_grad()``, on x86 processors. Of
             weights that were stored in half precision "half" loses nothing.
 
@@ -221,8 +221,7 @@ class LstmGmm(Recurrent):
                             component_temperature)]:  # fmt: skip
             if not isinstance(value, Real) or not 0 < value < math.inf:
                 raise ModelError(f"generate: {what} is {value!r}; it must be a number above 0.")
-        if not isinstance(noise, Real) or not 0 <= noise < math.inf:
-            raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")
+        check_noise(noise)
         if precision not in PRECISIONS:
             raise ModelError(f"generate: precision {precision!r}; it is one of {[*PRECISIONS]}.")
         like = self.normalizer.mean

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from numbers import Real
-
 import torch
 from torch import Tensor
 
 from ..errors import ModelError
-from .checks import checked_features, checked_start
+from .checks import check_noise, checked_features, checked_start
 from .fed_back import checked_real
 from .recurrent import Recurrent
 from .sampler import normal
@@ -116,6 +113,5 @@ class NextFrame(Recurrent):
         return torch.stack(frames, dim=1)
 
     def _checked_start(self, n: int, start: State, noise: float) -> State:
-        if not isinstance(noise, Real) or not 0 <= noise < math.inf:
-            raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")
+        check_noise(noise)
         return checked_start(self, n, start)
