@@ -244,8 +244,8 @@ def without_rest(clip: Tensor, fps: float, least: float = 0.3) -> Tensor:
 # ship: what is shipped. table: the equal budget of all rows of a comparison: updates, windows, and
 # about as many parameters. paper: the paper's own.
 _TABLE = DancePreset(
-    updates=2_000, decay=0, batch=16, frames=100, validate_every=250, width=128, noise=0.0,
-    learning_rate=1e-3, snapshots=500, schedule=2_000,
+    updates=1_500, decay=0, batch=16, frames=100, validate_every=250, width=128, noise=0.0,
+    learning_rate=1e-3, snapshots=500, schedule=1_500,
 )  # fmt: skip
 _PRESETS = {
     "smoke": DancePreset(
@@ -253,7 +253,7 @@ _PRESETS = {
         schedule=40,
     ),
     "table": _TABLE,
-    "ship": replace(_TABLE, updates=3_000, decay=1_000, width=256, snapshots=1_000),
+    "ship": replace(_TABLE, updates=3_000, decay=1_000, width=192, snapshots=1_000),
     "paper": replace(
         _TABLE, updates=500_000, batch=32, validate_every=1_000, width=1024, learning_rate=1e-4,
         warmup=0, snapshots=10_000, fps=60.0, metres=True, schedule=500_000,
