@@ -37,6 +37,30 @@ def test_curves_hold_their_data():
     assert axes.get_xlabel() == "fps" and axes.get_xscale() == "log"
 
 
+def test_curves_may_have_one_logarithmic_axis():
+    (axes,) = plots.curves({"one": ([1, 10], [0, 20])}, x="frame", y="m/s", log="x").axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")
+
+
+def test_survival_falls_by_one_rollout_at_every_failure():
+    (axes,) = plots.survival({"one": [20.0, np.inf, 5.0, 300.0]}, horizon=100.0).axes
+    assert axes.lines[0].get_xydata().tolist() == [
+        [0.1, 1], [5, 0.75], [20, 0.5], [100, 0.5]
+    ]  # fmt: skip
+    with pytest.raises(ViewerError, match="0 or more"):
+        plots.survival({"one": [np.nan]}, horizon=100.0)
+
+
+def test_recurrence_shows_a_gait_returning_once_a_stride():
+    twice = gaits.make(seconds=2, speed=1.3, noise=0, fps=30).positions()[:40]
+    twice = torch.cat([twice, twice])
+    axes, _ = plots.recurrence(twice, gaits.make(seconds=1).skeleton, 30).axes
+    apart = axes.images[0].get_array()
+    assert apart.shape == (80, 80) and np.allclose(apart, apart.T, atol=1e-4)
+    assert np.allclose(apart[np.arange(40), np.arange(40) + 40], 0, atol=1e-3)  # 40 frames later
+    assert apart.max() > 5  # cm
+
+
 def test_root_paths_start_at_zero_and_end_where_the_root_goes(walk):
     axes, *_ = plots.root_paths([walk], ["walk"]).axes
     way = np.array(axes.collections[0].get_segments())
