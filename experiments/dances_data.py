@@ -68,10 +68,10 @@ def _at_every(clip: Tensor, stride: float) -> Tensor:
     return whole[0]
 
 
-def moments(style: str, count: int) -> list[tuple[int, float]]:
-    """Clip of the test split, and seconds in it, of moments spread evenly over them all."""
+def moments(style: str, count: int, split: str = "test") -> list[tuple[int, float]]:
+    """Clip of a split, and seconds in it, of moments spread evenly over them all."""
     ahead = math.ceil(AHEAD * FPS)
-    lengths = [len(clip) for clip in of(style).clips("test")]
+    lengths = [len(clip) for clip in of(style).clips(split)]
     grid = [
         (number, (frame + 1) / FPS)
         for number, length in enumerate(lengths)
@@ -81,12 +81,12 @@ def moments(style: str, count: int) -> list[tuple[int, float]]:
     return [grid[int((i + 0.5) * len(grid) / count)] for i in range(count)]
 
 
-def seeds(style: str, count: int, fps: float = FPS) -> Seeds:
+def seeds(style: str, count: int, fps: float = FPS, split: str = "test") -> Seeds:
     """The same moments at any rate: frames before and after them."""
     data = of(style, fps)
-    names = [name for name, split in zip(data.names, data.splits, strict=True) if split == "test"]
-    clips, ahead = data.clips("test"), math.ceil(AHEAD * fps)
-    found = [(number, round(seconds * fps)) for number, seconds in moments(style, count)]
+    names = [name for name, its in zip(data.names, data.splits, strict=True) if its == split]
+    clips, ahead = data.clips(split), math.ceil(AHEAD * fps)
+    found = [(number, round(seconds * fps)) for number, seconds in moments(style, count, split)]
     return Seeds(
         torch.stack([clips[number][at - SEEN : at] for number, at in found]),
         torch.stack([clips[number][at : at + ahead] for number, at in found]),

@@ -42,6 +42,7 @@ MINUTES = (1, 2, 5, 11)  # at which rollouts are compared with each other
 TAIL = 10.0  # seconds before, of which they are compared
 LASTING = 1.0  # seconds for which a body that is only points must have diverged
 ELASTIC = "if bones may have any length"  # told beside what the claims ask
+NOISES = (0.2,)  # on what a dancer sees of itself, in normalised units; told beside the rest
 POINTS = 60  # of a curve over frames
 STRIP, POSES = 4.0, 8  # of a film strip before the latest failure: seconds, and poses
 GIVEN_AWAY = 2.0  # seconds from one window of a rollout to the next that is looked for in the data
@@ -78,11 +79,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 kept = snapshots(run).items()
                 found |= {"after updates": {n: _short(follow(p, row.data)) for n, p in kept}}
             rows[row.name]["seeds"][str(run.seed)] = found
-    dancers = {
-        name: follow(weights.find(name), name.partition("-")[2])
-        for name in weights.names()
-        if name.startswith("aclstm-") and (chosen.only is None or SHIPPED in chosen.only)
-    }
+    dancers = {}
+    for name in weights.names():
+        if name.startswith("aclstm-") and (chosen.only is None or SHIPPED in chosen.only):
+            path, style = weights.find(name), name.partition("-")[2]
+            judge = real_of(style, motionlab.load(path).fps).judge
+            dancers[name] = follow(path, style) | {"limits": limits_of(judge)}
+            dancers[name]["with noise"] = {
+                f"{noise:g}": followed(path, style, chosen.starts, chosen.frames, noise)
+                for noise in NOISES
+            }
     result = {
         "preset": chosen.preset, "starts": chosen.starts, "frames": chosen.frames,
         "curves are at frames": middles(chosen.frames), "rows": rows, "dancers": dancers,
@@ -102,18 +108,19 @@ def _short(found: dict) -> dict:
     return pick(found) | {ELASTIC: pick(found[ELASTIC])}
 
 
-def followed(path: Path, style: str, starts: int, frames: int) -> dict:
+def followed(path: Path, style: str, starts: int, frames: int, noise: float = 0.0) -> dict:
     """What became of the rollouts of some weights; kept, since they take minutes."""
     sha = hashlib.sha256(path.read_bytes()).hexdigest()
     model = motionlab.load(path)
     real = real_of(style, model.fps)
     name = f"{sha[:12]}-{dances_data.of(style, model.fps).hash[:6]}-{model.fps:g}-{starts}-{frames}"
+    name += f"-{noise:g}" * (noise > 0)
     kept = Path("runs") / "dances-rollouts" / f"{name}.json"
     if kept.exists():
         return json.loads(kept.read_text(encoding="utf-8"))
     print(f"{path} -> {kept}", flush=True)
     found = {"update": model.about.get("update"), "sha256": sha}
-    found |= told(model, real, dances_data.seeds(style, starts, model.fps).seen, frames)
+    found |= told(model, real, dances_data.seeds(style, starts, model.fps).seen, frames, noise)
     found = record.rounded(found)
     write_whole(kept, lambda stream: stream.write(json.dumps(found).encode()))
     return found
@@ -129,6 +136,7 @@ class Real(NamedTuple):
     elastic: rollouts.Judge  # whose bones may have any length
     tolerance: float  # of `metrics.loop`
     change: float  # mean motion change of points relative to the root
+    acceleration: float  # m/s², mean
     normalizer: Normalizer  # of poses as `_poses` gives them
     poses: list[Tensor]
     held_out: Tensor  # distances of held-out windows to the nearest of these
@@ -155,10 +163,33 @@ def real_of(style: str, fps: float) -> Real:
             [encoding.positions(clip) for clip in data.clips("train")], encoding.skeleton, fps
         ),
         float(np.concatenate(change).mean()),
+        _lively([encoding.positions(clip) for clip in data.clips("train")], fps),
         normalizer,
         training,
         metrics.nearest_window_distance(test, training, fps, reference_step=0).distance,
     )  # fmt: skip
+
+
+def limits_of(judge: rollouts.Judge) -> dict:
+    """What counts as failure, for whoever has no data; see `judge_from`."""
+    limits = vars(judge.limits) | {"bones": judge.limits.bones.tolist()}
+    limits.pop("skeleton")
+    return record.rounded({"limits": limits, "low": judge.low, "high": judge.high})
+
+
+def judge_from(written: dict, skeleton: motionlab.Skeleton, fps: float) -> rollouts.Judge:
+    """The judge that `limits_of` has written down."""
+    limits = dict(written["limits"])
+    limits["bones"] = torch.tensor(limits["bones"])
+    return rollouts.Judge(
+        metrics.Limits(skeleton, **limits), written["low"], written["high"], fps, LASTING
+    )
+
+
+def _lively(motions: Sequence[Tensor], fps: float) -> float:
+    """Mean acceleration (m/s²) of motions, each as long as it is."""
+    each = [float(metrics.acceleration(points, fps)) for points in motions]
+    return float(np.average(each, weights=[len(points) for points in motions]))
 
 
 def changes(features: Tensor, encoding) -> np.ndarray:
@@ -234,10 +265,11 @@ def middles(frames: int) -> list[float]:
 # -- all rollouts of one network ------------------------------------------------------------------
 
 
-def told(model: nn.Module, real: Real, seeds: Tensor, frames: int) -> dict:
+def told(model: nn.Module, real: Real, seeds: Tensor, frames: int, noise: float = 0.0) -> dict:
     """What became of the rollouts that go on from seeds (starts, seen, dim)."""
     fps, each = model.fps, []
-    for _, batch in rollouts.sampled(model, seeds, frames, seed=0):
+    sampling = {"noise": noise} if noise else {}
+    for _, batch in rollouts.sampled(model, seeds, frames, seed=0, **sampling):
         each += [judged(features, model.encoding, real) for features in batch]
     horizon = frames / fps
     lasted = np.array([one.failed for one in each])
@@ -284,6 +316,8 @@ def told(model: nn.Module, real: Real, seeds: Tensor, frames: int) -> dict:
     found["stagnations"] = stagnant([(one.pauses, one.sound / fps) for one in each])
     at_first = [one.head for one in each if one.failed > min(60, horizon)]
     at_last = [one.tails[horizon] for one in living]
+    if at_first:
+        found["acceleration over real, first minute"] = _lively(at_first, fps) / real.acceleration
     found["novelty"] = {"first minute": novelty(at_first, real), "end": novelty(at_last, real)}
     return found
 

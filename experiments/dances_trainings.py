@@ -59,7 +59,6 @@ ROWS = (
     _indian("length-1", "recorded and fed-back frames in turn", real=1, fed=1),
     _indian("length-2", "2 recorded frames, 2 fed back, and so on", real=2, fed=2),
     *_all_methods("walking"),
-    Row("aclstm-hybrid", "aclstm on Indian dance and salsa", data="hybrid"),
     _indian("fps-60", "60 frames a second, as the paper says", fps=60.0),
     _indian("staircase", "each layer a frame later than the one below", staircase=True),
     _indian("trim", "without the rest at both ends of a clip", trim=True),

@@ -28,7 +28,7 @@ def test_every_method_learns_every_style_and_the_plain_pair_has_three_seeds(scri
     wanted = {
         f"{method}-{style}" for method in METHODS for style in ("martial", "indian", "walking")
     }
-    assert wanted | {"aclstm-hybrid", "length-1", "length-2", "length-10", "fps-60"} <= set(names)
+    assert wanted | {"length-1", "length-2", "length-10", "fps-60"} <= set(names)
     assert {row.name for row in script.ROWS if len(row.seeds) == 3} == set(script.PLAIN)
 
 
