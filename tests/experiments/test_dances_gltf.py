@@ -9,7 +9,7 @@ pytest.importorskip("lightning_fabric")
 
 def test_dance_is_written_and_judged(experiment, untrained, tmp_path, monkeypatch):
     script = experiment("dances_gltf")
-    untrained("aclstm-hybrid")
+    untrained("aclstm-indian")
     weights = next(tmp_path.rglob("at-40.safetensors"))
     said = [{"severity": 0, "message": "wrong"}, {"severity": 1, "message": "odd"}]
     monkeypatch.setattr(script, "validated", lambda path: said if path.stat().st_size else [])

@@ -71,7 +71,7 @@ def test_mixing_by_hand(script):
 
 
 def test_result_is_told(untrained, script, tmp_path):
-    untrained("aclstm-hybrid")
+    untrained("aclstm-indian")
     path = next(tmp_path.rglob("at-40.safetensors"))
     script.main(["--model", str(path), "--starts", "2", "--seconds", "8", "--output", "found.json"])
     found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))

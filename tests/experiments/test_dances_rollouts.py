@@ -180,14 +180,47 @@ def test_rows_that_are_trained_are_followed_once(untrained, script, tmp_path, mo
 
 
 def test_shipped_dancers_are_followed(untrained, script, tmp_path, monkeypatch):
-    untrained("aclstm-hybrid")
+    untrained("aclstm-indian")
     path = next(tmp_path.rglob("at-40.safetensors"))
     monkeypatch.setattr(script.weights, "names", lambda: ["aclstm-indian", "lstm-gmm"])
     monkeypatch.setattr(script.weights, "find", lambda name: path)
     script.main(["--only", "shipped", "--starts", "2", "--frames", "60", "--output", "found.json"])
     found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
     assert list(found["dancers"]) == ["aclstm-indian"] and not found["rows"]
-    assert found["dancers"]["aclstm-indian"]["rollouts"] == 2
+    dancer = found["dancers"]["aclstm-indian"]
+    assert dancer["rollouts"] == dancer["with noise"]["0.2"]["rollouts"] == 2
+    assert dancer["sha256"] == dancer["with noise"]["0.2"]["sha256"]
+
+
+def test_limits_can_be_written_down_and_read_again(script, dances):
+    judge = script.real_of("indian", 30.0).judge
+    again = script.judge_from(
+        json.loads(json.dumps(script.limits_of(judge))), judge.limits.skeleton, judge.fps
+    )
+    wild = dances.of("indian").encoding.positions(dances.of("indian").clips("train")[0])
+    wild = torch.cat([wild, wild + torch.tensor([0.0, 9.0, 0.0])])
+    assert again.failures(wild) == judge.failures(wild)
+    assert math.isfinite(again.failures(wild)["diverged"])
+
+
+def test_noise_gives_a_start_more_than_one_future(untrained, tmp_path, experiment, monkeypatch):
+    script = experiment("dances_noise")
+    untrained("aclstm-indian")
+    path = next(tmp_path.rglob("at-40.safetensors"))
+    monkeypatch.setattr(script.weights, "names", lambda: ["aclstm-indian", "lstm-gmm"])
+    monkeypatch.setattr(script.weights, "find", lambda name: path)
+    load = script.motionlab.load
+    monkeypatch.setattr(script.motionlab, "load", lambda name: load(path))
+    script.main(["--starts", "2", "--seconds", "4", "--output", "found.json"])
+    found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))["dancers"]
+    assert list(found) == ["aclstm-indian"] and list(found["aclstm-indian"]) == [
+        "0",
+        "0.1",
+        "0.2",
+        "0.3",
+    ]
+    change = {level: its["change over real"] for level, its in found["aclstm-indian"].items()}
+    assert change["0"] != change["0.3"]
 
 
 def test_less_must_not_overwrite_the_result(script, capsys):
