@@ -188,8 +188,8 @@ def test_shipped_dancers_are_followed(untrained, script, tmp_path, monkeypatch):
     found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
     assert list(found["dancers"]) == ["aclstm-indian"] and not found["rows"]
     dancer = found["dancers"]["aclstm-indian"]
-    assert dancer["rollouts"] == dancer["with noise"]["0.2"]["rollouts"] == 2
-    assert dancer["sha256"] == dancer["with noise"]["0.2"]["sha256"]
+    assert dancer["rollouts"] == dancer["with noise"]["0.1"]["rollouts"] == 2
+    assert dancer["sha256"] == dancer["with noise"]["0.1"]["sha256"]
 
 
 def test_limits_can_be_written_down_and_read_again(script, dances):
