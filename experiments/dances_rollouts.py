@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if name.startswith("aclstm-") and (chosen.only is None or SHIPPED in chosen.only):
             path, style = weights.find(name), name.partition("-")[2]
             judge = real_of(style, motionlab.load(path).fps).judge
-            dancers[name] = follow(path, style) | {"limits": limits_of(judge)}
+            dancers[name] = follow(path, style) | {"limits": judge.config()}
             dancers[name]["with noise"] = {
                 f"{noise:g}": followed(path, style, chosen.starts, chosen.frames, noise)
                 for noise in NOISES
@@ -168,22 +168,6 @@ def real_of(style: str, fps: float) -> Real:
         training,
         metrics.nearest_window_distance(test, training, fps, reference_step=0).distance,
     )  # fmt: skip
-
-
-def limits_of(judge: rollouts.Judge) -> dict:
-    """What counts as failure, for whoever has no data; see `judge_from`."""
-    limits = vars(judge.limits) | {"bones": judge.limits.bones.tolist()}
-    limits.pop("skeleton")
-    return record.rounded({"limits": limits, "low": judge.low, "high": judge.high})
-
-
-def judge_from(written: dict, skeleton: motionlab.Skeleton, fps: float) -> rollouts.Judge:
-    """The judge that `limits_of` has written down."""
-    limits = dict(written["limits"])
-    limits["bones"] = torch.tensor(limits["bones"])
-    return rollouts.Judge(
-        metrics.Limits(skeleton, **limits), written["low"], written["high"], fps, LASTING
-    )
 
 
 def _lively(motions: Sequence[Tensor], fps: float) -> float:

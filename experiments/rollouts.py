@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import record
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import max_pool1d
@@ -46,6 +47,19 @@ class Judge:
             max(float(high.max()) for high in highs) + AWAY,
             fps,
         )
+
+    def config(self) -> dict:
+        """What counts as failure, fit for JSON: for whoever has no data. See `from_config`."""
+        limits = {key: its for key, its in vars(self.limits).items() if key != "skeleton"}
+        limits["bones"] = self.limits.bones.tolist()
+        kept = {key: its for key, its in vars(self).items() if key != "limits"}
+        return record.rounded(kept | {"limits": limits})
+
+    @classmethod
+    def from_config(cls, config: dict, skeleton: Skeleton) -> Judge:
+        limits = dict(config["limits"])
+        limits["bones"] = torch.tensor(limits["bones"])
+        return cls(**config | {"limits": metrics.Limits(skeleton, **limits)})
 
     def failures(self, positions: Tensor) -> dict[str, float]:
         """Seconds until one motion (frames, points, 3) fails in each way; infinite if never."""

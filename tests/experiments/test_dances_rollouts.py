@@ -194,8 +194,8 @@ def test_shipped_dancers_are_followed(untrained, script, tmp_path, monkeypatch):
 
 def test_limits_can_be_written_down_and_read_again(script, dances):
     judge = script.real_of("indian", 30.0).judge
-    again = script.judge_from(
-        json.loads(json.dumps(script.limits_of(judge))), judge.limits.skeleton, judge.fps
+    again = script.rollouts.Judge.from_config(
+        json.loads(json.dumps(judge.config())), judge.limits.skeleton
     )
     wild = dances.of("indian").encoding.positions(dances.of("indian").clips("train")[0])
     wild = torch.cat([wild, wild + torch.tensor([0.0, 9.0, 0.0])])

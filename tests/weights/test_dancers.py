@@ -25,13 +25,13 @@ UNLIKELY = 1e-3
 @pytest.mark.parametrize("style", ["martial", "indian", "hybrid", "walking"])
 @torch.no_grad()
 def test_a_dancer_lasts_as_the_book_says(style, experiment):
-    dances_rollouts = experiment("dances_rollouts")
+    rollouts = experiment("rollouts")
     told = json.loads(RESULT.read_text(encoding="utf-8"))["dancers"][f"aclstm-{style}"]
     model = motionlab.load(f"aclstm-{style}")
     features = model.generate(FRAMES, model.starts)
     assert features.isfinite().all()
 
-    judge = dances_rollouts.judge_from(told["limits"], model.encoding.skeleton, model.fps)
+    judge = rollouts.Judge.from_config(told["limits"], model.encoding.skeleton)
     failures = [judge.failures(model.encoding.positions(its)) for its in features]
     alive = sum(math.isinf(min(its.values())) for its in failures)
     seconds = [math.inf if its is None else its for its in told["failed (s)"]]

@@ -5,67 +5,32 @@ Every function returns a figure, transparent and legible on light and dark pages
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Sized
-from functools import wraps
-from numbers import Real
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
-import torch
 from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from torch import Tensor
 
 from ..errors import ViewerError
-from ..metrics import heading_frame
 from ..motion import Motion
-from ..skeleton import Skeleton
 from . import palette
+from .plot_rollouts import recurrence, survival
+from .plot_style import (
+    AROUND_ZERO,
+    INK,
+    SPEED,
+    check_motion,
+    check_named,
+    check_rate,
+    styled,
+)
 from .take import check_frame
 
-STYLE = Path(__file__).with_name("style.mplstyle")
-# viridis without its ends, which vanish on a black or a white page
-SPEED = ListedColormap(plt.get_cmap("viridis")(np.linspace(0.3, 0.92, 128)))
-# blue below zero, red above, and the page's own colour at zero
-AROUND_ZERO = ListedColormap(
-    [(0.30, 0.53, 0.85, abs(x) ** 0.7) if x < 0 else (0.87, 0.36, 0.22, x**0.7)
-     for x in np.linspace(-1, 1, 256)]
-)  # fmt: skip
-INK = "#808080"  # as the style's text: 4:1 on white and on black
-
-
-def styled(draw):
-    """Draw in the book's style; the figure is returned, not also shown by pyplot."""
-
-    @wraps(draw)
-    def drawn(*args, **kwargs) -> Figure:
-        with plt.style.context(STYLE):
-            figure = draw(*args, **kwargs)
-        plt.close(figure)
-        return figure
-
-    return drawn
-
-
-def _check_motion(plot: str, motion: Motion, frames: int = 1) -> None:
-    if not isinstance(motion, Motion):
-        raise ViewerError(f"{plot}: needs a Motion, not {motion!r}.")
-    if len(motion) < frames:
-        raise ViewerError(f"{plot}: {motion!r} is too short; it needs {frames} frames or more.")
-
-
-def _check_named(plot: str, named: Sized) -> None:
-    if len(named) == 0:
-        raise ViewerError(
-            f"{plot}: there is nothing to draw; give one name and its values or more."
-        )
-
-
-def _check_rate(plot: str, fps: float) -> None:
-    if not isinstance(fps, Real) or not 0 < fps < np.inf:
-        raise ViewerError(f"{plot}: fps is {fps!r}; it must be a positive number.")
+__all__ = [
+    "bars", "curves", "fan", "feature_maps", "feet", "joint_map", "over_time", "recurrence",
+    "root_paths", "scatter", "shares", "survival",
+]  # fmt: skip
 
 
 @styled
@@ -74,7 +39,7 @@ def joint_map(motion: Motion, frame: int = 0) -> Figure:
 
     The left half of the body is named on the right of the picture, as on someone who faces you.
     """
-    _check_motion("joint_map", motion)
+    check_motion("joint_map", motion)
     skeleton = motion.skeleton
     points = motion.positions()[check_frame(frame, len(motion))].numpy()
     across = _across(motion, points)
@@ -125,7 +90,7 @@ def bars(values: Sequence[float], names: Sequence[str], label: str, log: bool = 
 
     log : a logarithmic axis, on which only values above 0 can be shown.
     """
-    _check_named("bars", names)
+    check_named("bars", names)
     values, names = np.asarray(values, dtype=float), list(names)
     if values.shape != (len(names),):
         raise ViewerError(
@@ -156,7 +121,7 @@ def curves(
 
     log : True for two logarithmic axes, "x" for one.
     """
-    _check_named("curves", lines)
+    check_named("curves", lines)
     figure, axes = plt.subplots()
     for index, (name, (xs, ys)) in enumerate(lines.items()):
         axes.plot(xs, ys, "o-", label=name, color=palette.color(name, index))
@@ -175,62 +140,12 @@ def curves(
 
 
 @styled
-def survival(lines: Mapping[str, Sequence[float]], horizon: float) -> Figure:
-    """Share of rollouts that still go on, over seconds on a logarithmic axis.
-
-    Parameters
-    ----------
-    lines : {name: seconds until failure, one a rollout}, infinite for one that never failed.
-    horizon : seconds for which all of them were watched.
-    """
-    _check_named("survival", lines)
-    figure, axes = plt.subplots(figsize=(7.5, 3.6))
-    first = horizon / 1000
-    for index, (name, seconds) in enumerate(lines.items()):
-        seconds = np.sort(np.asarray(seconds, dtype=float))
-        if not len(seconds) or not (seconds >= 0).all():  # NaN is not
-            raise ViewerError(f"survival: {name!r} needs seconds of 0 or more; it has {seconds}.")
-        failed = seconds[seconds <= horizon].clip(min=first)
-        going = 1 - np.arange(len(failed) + 1) / len(seconds)
-        axes.step(
-            [first, *failed, horizon], [*going, going[-1]], where="post", label=name,
-            color=palette.color(name, index), lw=2,
-        )  # fmt: skip
-    axes.set(xscale="log", xlim=(first, horizon), ylim=(-0.03, 1.03))
-    axes.set(xlabel="time (s)", ylabel="share still going")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.legend()
-    return figure
-
-
-@styled
-def recurrence(positions: Tensor, skeleton: Skeleton, fps: float) -> Figure:
-    """How far apart the poses of a motion are at any two moments: stripes are returns.
-
-    positions : (frames, points, 3) metres. Poses are compared in the body's heading frame, at no
-        more than 600 moments; a distance is the mean over points.
-    """
-    every = max(1, -(-len(positions) // 600))
-    pose = heading_frame(positions[::every], skeleton)[0]
-    apart = torch.stack([(pose - one).norm(dim=-1).mean(-1) for one in pose])
-    end = len(positions) / fps
-    figure, axes = plt.subplots(figsize=(6, 5))
-    image = axes.imshow(
-        100 * apart.numpy(), origin="lower", extent=(0, end, 0, end), cmap="viridis", aspect="equal"
-    )
-    axes.set(xlabel="time (s)", ylabel="time (s)")
-    axes.grid(visible=False)
-    figure.colorbar(image, label="mean distance of a point (cm)", shrink=0.8)
-    return figure
-
-
-@styled
 def scatter(
     groups: Mapping[str, tuple[Sequence[float], Sequence[float], Sequence[float]]], x: str, y: str
 ) -> Figure:
     """Named clouds of discs ``{name: (xs, ys, sizes)}``; areas grow with the sizes, from a dot for
     0 to a disc of 9 mm for the largest."""
-    _check_named("scatter", groups)
+    check_named("scatter", groups)
     for name, (xs, ys, sizes) in groups.items():
         if not len(xs) == len(ys) == len(sizes) > 0:
             raise ViewerError(
@@ -253,8 +168,8 @@ def scatter(
 @styled
 def over_time(lines: Mapping[str, Sequence[float]], fps: float, y: str) -> Figure:
     """Named lines of one value a frame, over seconds; frames that are NaN leave a gap."""
-    _check_named("over_time", lines)
-    _check_rate("over_time", fps)
+    check_named("over_time", lines)
+    check_rate("over_time", fps)
     figure, axes = plt.subplots(figsize=(7.5, 3.2))
     for index, (name, values) in enumerate(lines.items()):
         values = np.asarray(values, dtype=float)
@@ -277,8 +192,8 @@ def shares(
 
     below : {name: a truth value a frame}, drawn as bars under the shares, such as contacts.
     """
-    _check_named("shares", parts)
-    _check_rate("shares", fps)
+    check_named("shares", parts)
+    check_rate("shares", fps)
     below = below or {}
     figure, axes = plt.subplots(figsize=(7.5, 3 + 0.3 * len(below)))
     time = np.arange(len(next(iter(parts.values())))) / fps
@@ -303,8 +218,8 @@ def feature_maps(maps: Mapping[str, Sequence], fps: float, groups: Mapping[str, 
     fps : frames per second.
     groups : {name: {what: slice}}, the rows that belong together, as an encoding's `slices`.
     """
-    _check_named("feature_maps", maps)
-    _check_rate("feature_maps", fps)
+    check_named("feature_maps", maps)
+    check_rate("feature_maps", fps)
     for name, features in maps.items():
         if np.ndim(features) != 2 or name not in groups:
             raise ViewerError(
@@ -341,7 +256,7 @@ def fan(paths: Mapping[str, Sequence], truth: Sequence | None = None) -> Figure:
     paths : {name: (n, frames, 2) metres, x and z}; one picture each, all at one scale.
     truth : (frames, 2) metres, drawn over each.
     """
-    _check_named("fan", paths)
+    check_named("fan", paths)
     for name, many in paths.items():
         if np.ndim(many) != 3 or np.shape(many)[2] != 2:
             raise ViewerError(
@@ -373,7 +288,7 @@ def root_paths(motions: Sequence[Motion], labels: Sequence[str] | None = None) -
             f"root_paths: {motions!r} is not a list of motions; give one, as root_paths([motion])."
         )
     for motion in motions:
-        _check_motion("root_paths", motion, frames=2)
+        check_motion("root_paths", motion, frames=2)
     if labels is None:
         labels = [motion.name for motion in motions]
     labels = [labels] if isinstance(labels, str) else list(labels)
@@ -413,7 +328,7 @@ def feet(motion: Motion, threshold: float = 0.45) -> Figure:
 
     Where the motion carries contact labels, these are drawn under the guess.
     """
-    _check_motion("feet", motion, frames=2)
+    check_motion("feet", motion, frames=2)
     figure, (height, speed, contact) = plt.subplots(
         3, 1, figsize=(7.5, 5.5), sharex=True, height_ratios=(2, 2, 1)
     )
