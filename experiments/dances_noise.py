@@ -3,9 +3,9 @@
     python experiments/dances_noise.py
 
 A dancer without noise has one future, and a few minutes of data have few: it ends in a loop. With
-noise it does not. A minute and a half of dance from twenty moments of the validation clips, at several
-levels; dancers ship with the least at which none loops. `dances_rollouts.py` tells what it does on
-held-out clips.
+noise it no longer repeats itself exactly. A minute and a half of dance from twenty moments of the
+validation clips, at several levels; dancers ship with the least at which none loops.
+`dances_rollouts.py` tells what it does on held-out clips.
 """
 
 from __future__ import annotations

@@ -72,11 +72,14 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     from motionlab.datasets import gaits
 
     commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", README, re.MULTILINE)
-    sample, prepare, train, tune, again = map(str.split, commands)
-    assert (prepare, train[0]) == (["prepare", "locomotion"], "train")  # need data, and hours
+    sample, dance, prepare, train, tune, again, dancer = map(str.split, commands)
+    # these need data, and minutes or hours
+    assert (prepare, train[0], dancer[0]) == (["prepare", "locomotion"], "train", "train")
     monkeypatch.chdir(tmp_path)
     assert main(sample) == 0
     assert read_bvh("walk.bvh").seconds == 30
+    assert main(dance) == 0
+    assert read_bvh("dance.bvh").seconds == 30
     (tmp_path / "my_clips").mkdir()
     for speed in range(20):
         write_bvh(gaits.make(seconds=3, speed=1 + speed / 20), f"my_clips/walk_{speed}.bvh")

@@ -227,7 +227,8 @@ def test_what_is_shipped(name):
         60, model.starts, generator=torch.Generator().manual_seed(0), **model.sampling
     )
     heights = model.encoding.positions(made)[..., 0, 1]
-    assert 0.4 < heights.min() and heights.max() < 1.4
+    lowest = 0.2 if name.startswith("aclstm") else 0.4  # recorded dancers crouch down to 0.24
+    assert lowest < heights.min() and heights.max() < 1.4
 
 
 def test_all_that_is_shipped_fits_the_budget():
