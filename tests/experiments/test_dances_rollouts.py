@@ -203,26 +203,6 @@ def test_limits_can_be_written_down_and_read_again(script, dances):
     assert math.isfinite(again.failures(wild)["diverged"])
 
 
-def test_noise_gives_a_start_more_than_one_future(untrained, tmp_path, experiment, monkeypatch):
-    script = experiment("dances_noise")
-    untrained("aclstm-indian")
-    path = next(tmp_path.rglob("at-40.safetensors"))
-    monkeypatch.setattr(script.weights, "names", lambda: ["aclstm-indian", "lstm-gmm"])
-    monkeypatch.setattr(script.weights, "find", lambda name: path)
-    load = script.motionlab.load
-    monkeypatch.setattr(script.motionlab, "load", lambda name: load(path))
-    script.main(["--starts", "2", "--seconds", "4", "--output", "found.json"])
-    found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))["dancers"]
-    assert list(found) == ["aclstm-indian"] and list(found["aclstm-indian"]) == [
-        "0",
-        "0.1",
-        "0.2",
-        "0.3",
-    ]
-    change = {level: its["change over real"] for level, its in found["aclstm-indian"].items()}
-    assert change["0"] != change["0.3"]
-
-
 def test_less_must_not_overwrite_the_result(script, capsys):
     for less in (["--preset", "smoke"], ["--frames", "200"], ["--starts", "3"]):
         with pytest.raises(SystemExit):
