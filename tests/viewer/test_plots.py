@@ -51,6 +51,16 @@ def test_survival_falls_by_one_rollout_at_every_failure():
         plots.survival({"one": [np.nan]}, horizon=100.0)
 
 
+def test_pauses_are_drawn_where_they_are():
+    (axes,) = plots.pauses({"one": [(1.0, 2.5), (9.0, 10.0)], "none": []}, horizon=10.0).axes
+    bars = [path.get_extents() for path in axes.collections[0].get_paths()]
+    assert [(bar.x0, bar.x1) for bar in bars] == [(1.0, 2.5), (9.0, 10.0)]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["one", "none"]
+    for wrong in ([(3.0, 2.0)], [(9.0, 11.0)], [(np.nan, 1.0)]):
+        with pytest.raises(ViewerError, match="within the 10 seconds"):
+            plots.pauses({"one": wrong}, horizon=10.0)
+
+
 def test_recurrence_shows_a_gait_returning_once_a_stride():
     twice = gaits.make(seconds=2, speed=1.3, noise=0, fps=30).positions()[:40]
     twice = torch.cat([twice, twice])

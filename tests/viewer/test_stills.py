@@ -12,7 +12,7 @@ from scipy.ndimage import label
 from motionlab import Motion, MotionLabError, Skeleton
 from motionlab.errors import ViewerError
 from motionlab.kinematics import yaw_matrix
-from motionlab.viewer import filmstrip, still, video
+from motionlab.viewer import filmstrip, stack, still, video
 from motionlab.viewer import probe as probe_
 from motionlab.viewer.picture import Camera, Figure, Floor, Picture, capsules, unit
 from motionlab.viewer.stills import open_painter
@@ -153,6 +153,16 @@ def test_labels_add_a_band_with_text():
     assert label(band.max(axis=0) > 0)[1] >= 9, "three times, each of several letters"
 
 
+def test_a_stack_has_every_picture_under_its_name():
+    red, blue = (Image.new("RGBA", (w, 20), c) for w, c in ((60, "red"), (200, "blue")))
+    sheet = np.asarray(stack({"one": red, "another": blue}))
+    assert sheet.shape[1] == 200
+    reds, blues = (np.all(sheet == c, axis=-1) for c in ((255, 0, 0, 255), (0, 0, 255, 255)))
+    assert (reds.sum(), blues.sum()) == (60 * 20, 200 * 20)
+    between = slice(np.nonzero(reds)[0].max() + 1, np.nonzero(blues)[0].min())
+    assert label(sheet[between, :, 3].max(axis=0) > 0)[1] >= 5, "the letters of a name"
+
+
 def test_contacts_ring_the_feet():
     motion = stroll(contacts=True)
     plain, ringed = (
@@ -207,6 +217,7 @@ def test_video(tmp_path):
         (lambda m: video(m, "film.mp4", fps=float("nan")), "fps is nan"),
         (lambda m: video(m, "film.mp4", fps="30"), "fps is '30'"),
         (lambda m: video(m, "film.mp4", background="blu"), "^background: 'blu'"),
+        (lambda m: stack({}), "no picture"),
         (lambda m: filmstrip(m, 0), "0 bodies"),
         (lambda m: filmstrip(m, -1), "-1 bodies"),
         (lambda m: filmstrip(m, 2.5), "2.5 bodies"),

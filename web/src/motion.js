@@ -4,7 +4,22 @@ const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buff
 const ROOT_UNIT = 1e-4; // metres
 const SMOOTH = 0.45; // seconds on each side over which the followed path is averaged
 
-/** One motion: decodes positions frame by frame, so that 10 s of 57 points cost nothing at start. */
+/** The numbers (frames, width) that player.py's in_few_bytes wrote as changes of their changes. */
+export function fromFewBytes(sent, frames, width) {
+  const numbers = new Int16Array(frames * width);
+  for (let i = 0, at = 0; i < numbers.length; i++) {
+    let unsigned = 0;
+    for (let shift = 0, more = true; more; shift += 7) {
+      more = sent[at] > 127;
+      unsigned |= (sent[at++] & 127) << shift;
+    }
+    const bent = unsigned & 1 ? -(unsigned + 1) / 2 : unsigned / 2;
+    numbers[i] = bent + (i < width ? 0 : 2 * numbers[i - width]) - (i < 2 * width ? 0 : numbers[i - 2 * width]);
+  }
+  return numbers;
+}
+
+/** One motion: whole numbers are read at the start, metres worked out for the frame that is drawn. */
 export class Track {
   constructor(data, stride, fps) {
     Object.assign(this, { label: data.label, color: data.color, bones: data.bones, extras: data.extras });
@@ -13,7 +28,7 @@ export class Track {
     this.pointCount = data.points;
     this.scale = data.scale;
     this.root = new Int32Array(bytes(data.root));
-    this.local = new Int16Array(bytes(data.local));
+    this.local = fromFewBytes(new Uint8Array(bytes(data.local)), data.frames, 3 * data.points);
     this.contacts = data.contacts ? new Uint8Array(bytes(data.contacts)) : null;
     this.contactPoints = data.contact_points;
     this.points = new Float32Array(3 * (this.pointCount + this.extras.length));

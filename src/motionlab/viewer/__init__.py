@@ -9,7 +9,7 @@ from .player import Player, bundle_path
 from .show import show
 
 # Drawn by libraries that take their time to load: imported when first used.
-_STILLS = ("still", "filmstrip", "video")
+_STILLS = ("still", "filmstrip", "stack", "video")
 __all__ = [
     "Player",
     "bundle_path",
@@ -20,6 +20,7 @@ __all__ = [
     "plots",
     "scene",
     "show",
+    "stack",
     "still",
     "video",
 ]

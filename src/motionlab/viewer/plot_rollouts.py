@@ -1,4 +1,4 @@
-"""Pictures of what becomes of long rollouts: how many last, and what returns in them."""
+"""Pictures of what becomes of long rollouts: how many last, what returns in them, when they pause."""
 
 from __future__ import annotations
 
@@ -51,17 +51,44 @@ def recurrence(positions: Tensor, skeleton: Skeleton, fps: float) -> Figure:
     """How far apart the poses of a motion are at any two moments: stripes are returns.
 
     positions : (frames, points, 3) metres. Poses are compared in the body's heading frame, at no
-        more than 600 moments; a distance is the mean over points.
+        more than 300 moments; a distance is the mean over points.
     """
-    every = max(1, -(-len(positions) // 600))
+    every = max(1, -(-len(positions) // 300))
     pose = heading_frame(positions[::every], skeleton)[0]
     apart = torch.stack([(pose - one).norm(dim=-1).mean(-1) for one in pose])
     end = len(positions) / fps
     figure, axes = plt.subplots(figsize=(6, 5))
     image = axes.imshow(
-        100 * apart.numpy(), origin="lower", extent=(0, end, 0, end), cmap="viridis", aspect="equal"
-    )
+        100 * apart.numpy(), origin="lower", extent=(0, end, 0, end),
+        cmap=plt.get_cmap("viridis", 8), interpolation="nearest",  # a page that weighs a quarter
+    )  # fmt: skip
     axes.set(xlabel="time (s)", ylabel="time (s)")
     axes.grid(visible=False)
     figure.colorbar(image, label="mean distance of a point (cm)", shrink=0.8)
+    return figure
+
+
+@styled
+def pauses(found: Mapping[str, Sequence[tuple[float, float]]], horizon: float) -> Figure:
+    """When rollouts stand still, a row each: bars where they do, pale where they go on.
+
+    Parameters
+    ----------
+    found : {name: (start, end) of each pause in seconds}, as `motionlab.metrics.stagnations` says.
+    horizon : seconds for which all of them were watched.
+    """
+    check_named("pauses", found)
+    figure, axes = plt.subplots(figsize=(7.5, 0.8 + 0.24 * len(found)))
+    for row, (name, times) in enumerate(found.items()):
+        if not all(0 <= start <= end <= horizon for start, end in times):
+            raise ViewerError(
+                f"pauses: {name!r} has {list(times)}; a pause starts and ends, in this order, "
+                f"within the {horizon:g} seconds of the horizon."
+            )
+        axes.barh(row, horizon, height=0.6, color=palette.CYCLE[0], alpha=0.25)
+        still = [(start, end - start) for start, end in times]
+        axes.broken_barh(still, (row - 0.3, 0.6), color=palette.CYCLE[1])
+    axes.set(xlim=(0, horizon), xlabel="time (s)", yticks=range(len(found)), yticklabels=found)
+    axes.invert_yaxis()
+    axes.grid(visible=False)
     return figure

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from ..errors import ViewerError
 from ..motion import Motion
 from . import palette
-from .plot_rollouts import recurrence, survival
+from .plot_rollouts import pauses, recurrence, survival
 from .plot_style import (
     AROUND_ZERO,
     INK,
@@ -28,8 +28,8 @@ from .plot_style import (
 from .take import check_frame
 
 __all__ = [
-    "bars", "curves", "fan", "feature_maps", "feet", "joint_map", "over_time", "recurrence",
-    "root_paths", "scatter", "shares", "survival",
+    "bars", "curves", "fan", "feature_maps", "feet", "joint_map", "over_time", "pauses",
+    "recurrence", "root_paths", "scatter", "shares", "survival",
 ]  # fmt: skip
 
 

@@ -7,7 +7,7 @@ and dark pages. VTK draws where it can, matplotlib where it cannot (see ``probe.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
@@ -127,6 +127,24 @@ def filmstrip(
     return _labelled(image, middles, [f"{frame / take.fps:.2f} s" for frame in frames])
 
 
+def stack(pictures: Mapping[str, Image.Image]) -> Image.Image:
+    """Film strips one under another, each under its name.
+
+    pictures : {name: picture}, as `filmstrip` draws them; the widest says how wide the whole is.
+    """
+    if not pictures:
+        raise ViewerError("stack: there is no picture; give one name and its picture or more.")
+    width = max(picture.width for picture in pictures.values())
+    height = sum(picture.height + LABEL_HEIGHT for picture in pictures.values())
+    sheet = Image.new("RGBA", (width, height), (0, 0, 0, 0))
+    pen, top = ImageDraw.Draw(sheet), 0
+    for name, picture in pictures.items():
+        pen.text((4, top + LABEL_HEIGHT / 2), name, LABEL_INK, _font(15), anchor="lm")
+        sheet.paste(picture, (0, top + LABEL_HEIGHT))
+        top += picture.height + LABEL_HEIGHT
+    return sheet
+
+
 def video(
     motion,
     path: str | Path,
@@ -207,7 +225,8 @@ def open_painter(size: tuple[int, int], backend: str | None = None):
 
 def _draw(picture: Picture, backend: str | None) -> Image.Image:
     with open_painter(picture.size, backend) as paint:
-        return Image.fromarray(paint(picture))
+        # steps of 4 in 255 are not seen, and a page with them weighs a quarter less
+        return Image.fromarray(paint(picture) & 252)
 
 
 def _line_up(
@@ -243,12 +262,15 @@ def _labelled(image: Image.Image, middles: np.ndarray, texts: list[str]) -> Imag
     """Add a band below with a text centred at each of ``middles`` (pixels)."""
     sheet = Image.new("RGBA", (image.width, image.height + LABEL_HEIGHT), (0, 0, 0, 0))
     sheet.paste(image, (0, 0))
-    size = int(np.clip(image.width / len(texts) / 4.5, 8, 17))
-    font = ImageFont.truetype(str(Path(get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")), size)
+    font = _font(int(np.clip(image.width / len(texts) / 4.5, 8, 17)))
     pen = ImageDraw.Draw(sheet)
     for middle, text in zip(middles, texts, strict=True):
         pen.text((middle, image.height + LABEL_HEIGHT / 2), text, LABEL_INK, font, anchor="mm")
     return sheet
+
+
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    return ImageFont.truetype(str(Path(get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")), size)
 
 
 @contextmanager
