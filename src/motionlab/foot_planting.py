@@ -152,11 +152,11 @@ def plant(
     # floor; an ankle may, a little, while the toes are up.
     low = torch.stack([heights[0] - _DIP - ankle[:, 1], heights[1] - (ankle + reach)[:, 1]], 1)
     shift[:, 1] = shift[:, 1].maximum(low.amax(1))
-    toes = _off_the_floor(toes, (ankle + shift + reach)[:, 1], tip)
+    toes = off_the_floor(toes, (ankle + shift + reach)[:, 1], tip)
     return Foot(ankle + shift, foot, toes, contacts, shift)
 
 
-def _off_the_floor(toes: Tensor, height: Tensor, tip: Tensor) -> Tensor:
+def off_the_floor(toes: Tensor, height: Tensor, tip: Tensor) -> Tensor:
     """Toes (frames, 3, 3) pitched up where their tip would dip into the floor."""
     length = tip.norm()
     if length < _TIP:

@@ -142,10 +142,18 @@ class JointAngles:
         """Root positions (..., frames, 3) and local rotations (..., frames, joints, 3, 3)."""
         features = check_features(self, features)
         tilt, joints = self._turns(features)
-        path, yaw = walk(features[..., :3], read_start(start, features, default=(0.0, 0.0, 0.0)))
+        place, yaw = self._way(features, start)
         root = torch.einsum("...ab,...bc->...ac", yaw_matrix(yaw), tilt)
-        place = torch.stack([path[..., 0], features[..., 3], path[..., 2]], dim=-1)
         return place, torch.cat([root[..., None, :, :], joints], dim=-3)
+
+    def root_path(self, features: Tensor, start: Start | None = None) -> Tensor:
+        """Root positions (..., frames, 3), metres; `start` as for `Encoding.positions`."""
+        return self._way(check_features(self, features), start)[0]
+
+    def _way(self, features: Tensor, start: Start | None) -> tuple[Tensor, Tensor]:
+        """Root positions (..., frames, 3) and yaw (..., frames)."""
+        path, yaw = walk(features[..., :3], read_start(start, features, default=(0.0, 0.0, 0.0)))
+        return torch.stack([path[..., 0], features[..., 3], path[..., 2]], dim=-1), yaw
 
     def to_motion(
         self, features: Tensor, start: Start | None = None, name: str = "", source: str = ""

@@ -9,7 +9,18 @@ is hidden in the model.
 from .aclstm import AcLstm, auto_condition
 from .erd import Erd
 from .lstm_gmm import LstmGmm, Mixture
+from .refiner import Discriminator, Refiner
 from .seq2seq import Seq2Seq
 from .state import State
 
-__all__ = ["AcLstm", "Erd", "LstmGmm", "Mixture", "Seq2Seq", "State", "auto_condition"]
+__all__ = [
+    "AcLstm",
+    "Discriminator",
+    "Erd",
+    "LstmGmm",
+    "Mixture",
+    "Refiner",
+    "Seq2Seq",
+    "State",
+    "auto_condition",
+]

@@ -47,16 +47,24 @@ def checked_features(model: _Model, features: Tensor) -> Tensor:
 def checked_start(model: _Model, n: int, start: State) -> State:
     """The state, on the model's device and in its precision, from which n frames can be generated.
 
-    It must have the shapes of the model's `zero_state`. Raises ModelError.
+    Raises ModelError.
     """
     if not isinstance(n, Integral) or n < 1:
         raise ModelError(f"generate: {n!r} frames; ask for 1 or more.")
+    return checked_state(model, start, "generate: start")
+
+
+def checked_state(model: _Model, state: State, what: str = "state") -> State:
+    """A state, on the model's device and in its precision.
+
+    It must have the shapes of the model's `zero_state`. Raises ModelError, calling it `what`.
+    """
     shapes = [part.shape[1:] for part in model.zero_state()]
-    if not isinstance(start, State) or [part.shape[1:] for part in start] != shapes:
-        raise ModelError("generate: start is no state of this model; `observe` gives one.")
-    if not all(part.isfinite().all() for part in start):
-        raise ModelError("generate: start holds a NaN or infinite value.")
-    return State(*(part.to(model.normalizer.mean) for part in start))
+    if not isinstance(state, State) or [part.shape[1:] for part in state] != shapes:
+        raise ModelError(f"{what} is no state of this model; `observe` gives one.")
+    if not all(part.isfinite().all() for part in state):
+        raise ModelError(f"{what} holds a NaN or infinite value.")
+    return State(*(part.to(model.normalizer.mean) for part in state))
 
 
 def check_noise(noise: float) -> None:

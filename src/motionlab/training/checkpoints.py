@@ -18,9 +18,9 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import MotionLabError, TrainingError
-from ..models import AcLstm, Erd, LstmGmm, Seq2Seq
+from ..models import AcLstm, Erd, LstmGmm, Refiner, Seq2Seq
 
-_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq)}
+_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner)}
 _STARTS = "starts."
 
 

@@ -1,0 +1,187 @@
+"""The refiner of RNN-GAN, and the discriminator that teaches it what real feet do.
+
+Wang, Chai and Xia (2021), *Combining Recurrent Neural Networks and Adversarial Training for Human
+Motion Synthesis and Control*, section 4.2.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import softplus
+
+from ..encodings import JointAngles, Normalizer
+from ..errors import ModelError
+from .checks import checked_features, checked_state
+from .recurrent import Recurrent
+from .state import State
+
+
+class Refiner(Recurrent):
+    """FC - LSTM - FC, and the motion itself added (eq. 11): what should a frame have been?
+
+    A generator that names one joint angle after the other does not feel where they put the foot. The
+    refiner does: it sees, beside the features, where hands, toes and head are and how they move, and
+    it corrects the features. It looks at a motion as it comes, frame by frame, never ahead, so that
+    it can follow a stream.
+
+    Parameters
+    ----------
+    encoding : what a row of features means.
+    normalizer : of the features, fitted on the training split.
+    width : of the hidden layers (the paper's is not known).
+    effectors : Normalizer of what `end_effectors` gives, six numbers an end effector; from
+        `effector_normalizer`. None: to be filled by `load_state_dict`.
+
+    Raises
+    ------
+    ModelError : the encoding is no `JointAngles`, or a normaliser is for something else.
+    """
+
+    layers = 1
+
+    def __init__(
+        self,
+        encoding: JointAngles,
+        normalizer: Normalizer,
+        width: int = 256,
+        effectors: Normalizer | None = None,
+    ) -> None:
+        if not isinstance(encoding, JointAngles):
+            raise ModelError(f"A refiner corrects JointAngles, not {type(encoding).__name__}.")
+        super().__init__(encoding, normalizer, width)
+        self.effectors = _checked(encoding, effectors)
+        self.enter = nn.Sequential(
+            nn.Linear(self.kept + len(self.effectors.mean), width), nn.ReLU()
+        )
+        self.lstm = nn.LSTM(width, width, batch_first=True)
+        self.leave = nn.Linear(width, self.kept)
+        for parameter in self.leave.parameters():  # at first it leaves every motion as it is
+            nn.init.zeros_(parameter)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Refined features, as many as `features` (batch, frames, dim)."""
+        return self.refine(features)[0]
+
+    def refine(self, features: Tensor, state: State | None = None) -> tuple[Tensor, State]:
+        """Refine a piece of motion, and remember what the next piece needs.
+
+        Parameters
+        ----------
+        features : (batch, frames, dim), or (frames, dim) for a batch of one; raw units.
+        state : after the piece before; None at the beginning, where the first frame is taken to
+            have been there before as well.
+
+        Returns
+        -------
+        refined features (batch, frames, dim), and the state after them. Pieces of any length give
+        what the whole gives.
+
+        Raises
+        ------
+        ModelError : other features than this model's, NaN, or a state of another model or batch.
+        """
+        features = torch.as_tensor(features)
+        features = checked_features(self, features[None] if features.ndim == 2 else features)
+        if state is None:
+            state = self.zero_state(len(features))._replace(frame=features[:, 0])
+        state = checked_state(self, state)
+        if len(state.frame) != len(features):
+            raise ModelError(f"A state of {len(state.frame)} motions; there are {len(features)}.")
+        with_before = torch.cat([state.frame[:, None], features], dim=1)
+        moving = self.encoding.end_effectors(with_before)[:, 1:].flatten(-2)
+        normalized = self.normalizer(features)
+        seen = torch.cat([normalized, self.effectors(moving)], dim=-1)
+        memory = (part.transpose(0, 1).contiguous() for part in (state.hidden, state.cell))
+        felt, (hidden, cell) = self.lstm(self.enter(seen), tuple(memory))
+        refined = self.normalizer.inverse(normalized + self.leave(felt))
+        return refined, State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1))
+
+    def _seen(self, features: Tensor) -> State:
+        return self.refine(features)[1]
+
+
+class Discriminator(nn.Module):
+    """FC - bidirectional LSTM - FC (eq. 12): is this real? It sees end effectors alone.
+
+    Where hands, toes and head are, how they move, and, if the encoding has them, the contacts. It
+    looks at a window forwards and backwards, and answers for every frame of it.
+
+    Parameters
+    ----------
+    encoding : of the motions.
+    effectors : as of `Refiner`.
+    width : of the hidden layers, the LSTM's in each direction.
+    """
+
+    def __init__(
+        self, encoding: JointAngles, effectors: Normalizer | None = None, width: int = 128
+    ) -> None:
+        super().__init__()
+        self.encoding, self.effectors = encoding, _checked(encoding, effectors)
+        contacts = encoding.slices.get("contacts", slice(0, 0))
+        seen = len(self.effectors.mean) + contacts.stop - contacts.start
+        self.enter = nn.Sequential(nn.Linear(seen, width), nn.ReLU())
+        self.lstm = nn.LSTM(width, width, batch_first=True, bidirectional=True)
+        self.leave = nn.Linear(2 * width, 1)
+
+    def seen(self, features: Tensor) -> Tensor:
+        """All that it sees of features (batch, frames, dim): (batch, frames, 6 a joint + contacts)."""
+        moving = self.effectors(self.encoding.end_effectors(features).flatten(-2))
+        contacts = self.encoding.contacts(features)
+        return moving if contacts is None else torch.cat([moving, contacts], dim=-1)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Logits (batch, frames) of being real: above 0 where it takes a frame for real."""
+        return self.judge(self.seen(features))
+
+    def judge(self, seen: Tensor) -> Tensor:
+        """The same of what `seen` gives."""
+        return self.leave(self.lstm(self.enter(seen))[0])[..., 0]
+
+
+# -- the game (eq. 9, 10, 13) -----------------------------------------------------------------------
+
+
+def fooling_loss(refined: Tensor) -> Tensor:
+    """-log D of refined motion (eq. 9), mean over logits: the refiner wants them taken for real."""
+    return softplus(-refined).mean()
+
+
+def telling_loss(real: Tensor, refined: Tensor) -> Tensor:
+    """-log D of real and -log(1 - D) of refined motion (eq. 10), each a mean over logits."""
+    return softplus(-real).mean() + softplus(refined).mean()
+
+
+def root_deviation(encoding: JointAngles, features: Tensor, refined: Tensor) -> Tensor:
+    """How far refined roots are from where they were (eq. 13): mean square in m² over all frames.
+
+    features, refined : (..., frames, dim), set out from the same place.
+    """
+    away = encoding.root_path(refined) - encoding.root_path(features)
+    return away.square().sum(-1).mean()
+
+
+def effector_normalizer(encoding: JointAngles, clips: list[Tensor]) -> Normalizer:
+    """Mean and deviation of positions (m) and velocities (m/s) of end effectors.
+
+    clips : list of features (frames, dim), the training split.
+    """
+    found = torch.cat([encoding.end_effectors(clip).flatten(-2) for clip in clips])
+    normalizer = Normalizer(found.shape[-1])
+    std, mean = torch.std_mean(found.double(), dim=0, correction=0)
+    normalizer.mean.copy_(mean)
+    normalizer.std.copy_(std.clamp(min=1e-3))
+    return normalizer
+
+
+def _checked(encoding: JointAngles, effectors: Normalizer | None) -> Normalizer:
+    """The normaliser of end effectors, one that does nothing if None; ModelError if it is no such."""
+    size = 6 * len(encoding.effector_names)
+    effectors = effectors or Normalizer(size)
+    if len(effectors.kept) != size:
+        raise ModelError(
+            f"effectors is for {len(effectors.kept)} numbers; {len(encoding.effector_names)} end "
+            f"effectors have {size}."
+        )
+    return effectors
