@@ -10,11 +10,13 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import dances_data
 import record
 import rollouts
 import torch
+from dances_rollouts import LASTING
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
@@ -54,17 +56,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     each = [float(right[truth == number].float().mean()) for number in range(len(STYLES))]
 
     seeds = dances_data.seeds("hybrid", chosen.starts, fps)
-    said = []
+    judge = replace(rollouts.judge_of(data), lasting=LASTING)
+    said, whole = [], []
     for _, batch in rollouts.sampled(model, seeds.seen, round(chosen.seconds * fps), seed=0):
         for features in batch:
             points = rollouts.points_of(model.encoding, features)
             finite = points.isfinite().flatten(1).all(1)
             said.append(is_salsa(described(points[finite], skeleton, fps, SECONDS)))
+            failed = min(min(judge.failures(points).values()), chosen.seconds)
+            whole.append(said[-1][: int(failed / SECONDS)])
     result = {
         "weights": record.about_weights(model, path), "seconds of a rollout": chosen.seconds,
         "learned from": _counts(labels), "held out": _counts(truth),
         "right": dict(zip(STYLES, each, strict=True)) | {"mean": sum(each) / len(each)},
-        **mixed(said),
+        **mixed(said), "until they fail": mixed(whole),
         "rollouts": [
             {"begins in": clip, "salsa": [round(float(p), 3) for p in its]}
             for clip, its in zip(seeds.clips, said, strict=True)

@@ -174,7 +174,8 @@ def z5(limits: dict, predicted: dict, found: dict) -> Verdict:
 
 
 def z6(limits: dict, found: dict) -> Verdict:
-    right, share, both = found["right"]["mean"], found["share of windows"], found["visit both"]
+    right, sound = found["right"]["mean"], found["until they fail"]
+    share, both = sound["share of windows"], sound["visit both"]
     numbers = {"classifier is right on held-out windows": right}
     if len(found["rollouts"]) < STARTS or found["seconds of a rollout"] < 60:
         raise Absent("the result there is of fewer or shorter rollouts than the rule asks for")
@@ -182,6 +183,7 @@ def z6(limits: dict, found: dict) -> Verdict:
         return Verdict(UNTESTABLE, numbers, "the styles can't be told apart")
     numbers |= {f"share of windows, {style}": its for style, its in share.items()}
     numbers["rollouts that visit both"] = both
+    numbers["rollouts that visit both, before or after they fail"] = found["visit both"]
     if min(share.values()) < limits["share"]:
         return Verdict(NOT, numbers)
     return Verdict(REPRODUCED if both >= limits["both"] else PARTLY, numbers)

@@ -87,8 +87,9 @@ def lengths(means, change):
 
 
 def hybrid(right, salsa, both, starts=20):
-    return {"right": {"mean": right}, "share of windows": {"indian": 1 - salsa, "salsa": salsa},
-            "visit both": both, "rollouts": [{}] * starts, "seconds of a rollout": 60.0}  # fmt: skip
+    found = {"share of windows": {"indian": 1 - salsa, "salsa": salsa}, "visit both": both}
+    return {"right": {"mean": right}, "until they fail": found, "visit both": 1.0,
+            "rollouts": [{}] * starts, "seconds of a rollout": 60.0}  # fmt: skip
 
 
 def speed(full, half, width=1024):

@@ -78,4 +78,6 @@ def test_result_is_told(untrained, script, tmp_path):
     assert found["right"]["mean"] > 0.9
     assert [len(its["salsa"]) for its in found["rollouts"]] == [4, 4]
     assert math.isclose(sum(found["share of windows"].values()), 1)
+    # bones of a network that was never trained fit no body: it fails at once
+    assert found["until they fail"]["windows"] < found["windows"]
     assert {its["begins in"].split("/")[1][:5] for its in found["rollouts"]} == {"india", "salsa"}

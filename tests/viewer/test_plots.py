@@ -45,7 +45,7 @@ def test_curves_may_have_one_logarithmic_axis():
 def test_survival_falls_by_one_rollout_at_every_failure():
     (axes,) = plots.survival({"one": [20.0, np.inf, 5.0, 300.0]}, horizon=100.0).axes
     assert axes.lines[0].get_xydata().tolist() == [
-        [0.1, 1], [5, 0.75], [20, 0.5], [100, 0.5]
+        [0.005, 1], [5, 0.75], [20, 0.5], [100, 0.5]
     ]  # fmt: skip
     with pytest.raises(ViewerError, match="0 or more"):
         plots.survival({"one": [np.nan]}, horizon=100.0)

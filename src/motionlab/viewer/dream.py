@@ -103,7 +103,7 @@ def page_figure(
     characters: int = 1,
     caption: str | None = None,
     *,
-    seconds: float = 3.0,
+    seconds: float = 2.0,
     trail: str | int | Sequence[str | int] | None = None,
     color: str = "RNN",
     height: int = 380,

@@ -30,8 +30,11 @@ PATH = "#e3b93a"
 
 
 def color(name: str, index: int = 0) -> str:
-    """The hex colour of a method; for any other name the `index`-th of the cycle."""
-    return COLORS.get(name, CYCLE[index % len(CYCLE)])
+    """The hex colour of a method; for any other name the `index`-th of the cycle.
+
+    What follows a comma does not count: "acLSTM, seed 1" is acLSTM's.
+    """
+    return COLORS.get(name.partition(",")[0], CYCLE[index % len(CYCLE)])
 
 
 def check_color(value: str, argument: str = "color") -> str:

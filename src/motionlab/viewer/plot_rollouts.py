@@ -28,7 +28,7 @@ def survival(lines: Mapping[str, Sequence[float]], horizon: float) -> Figure:
     """
     check_named("survival", lines)
     figure, axes = plt.subplots(figsize=(7.5, 3.6))
-    first = horizon / 1000
+    first = horizon / 20_000
     for index, (name, seconds) in enumerate(lines.items()):
         seconds = np.sort(np.asarray(seconds, dtype=float))
         if not len(seconds) or not (seconds >= 0).all():  # NaN is not

@@ -5,6 +5,7 @@ Every function returns a figure, transparent and legible on light and dark pages
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
@@ -110,6 +111,9 @@ def bars(values: Sequence[float], names: Sequence[str], label: str, log: bool = 
     return figure
 
 
+DASHES = ("-", "--", ":", "-.")
+
+
 @styled
 def curves(
     lines: Mapping[str, tuple[Sequence[float], Sequence[float]]],
@@ -120,11 +124,17 @@ def curves(
     """Named lines ``{name: (xs, ys)}`` over labelled axes, with a mark at every value.
 
     log : True for two logarithmic axes, "x" for one.
+
+    Lines of one colour, such as those of one method, are told apart by their dashes.
     """
     check_named("curves", lines)
     figure, axes = plt.subplots()
+    drawn: Counter[str] = Counter()
     for index, (name, (xs, ys)) in enumerate(lines.items()):
-        axes.plot(xs, ys, "o-", label=name, color=palette.color(name, index))
+        color = palette.color(name, index)
+        dashes = DASHES[drawn[color] % len(DASHES)]
+        axes.plot(xs, ys, "o", ls=dashes, label=name, color=color)
+        drawn[color] += 1
     if log == "x":
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")

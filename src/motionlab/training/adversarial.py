@@ -1,0 +1,349 @@
+"""The game of refiner and discriminator (RNN-GAN, section 4.2.2), and what keeps it from collapse.
+
+Each step lets the discriminator learn once to tell real windows from refined ones, and the refiner
+some times to fool it. Chance is a function of the seed and the number of the step, so that a game
+that was stopped goes on as if it had not been.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import asdict, dataclass
+from itertools import count
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+from torch.nn.utils.parametrizations import spectral_norm
+from tqdm import tqdm
+
+from ..errors import DivergedError, TrainingError
+from ..models import Discriminator, Refiner
+from ..models.refiner import effector_normalizer, fooling_loss, root_deviation, telling_loss
+from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
+from .loop import CHECKPOINT
+from .prepared import Prepared
+from .windows import Windows
+
+OBSERVED = 2.0  # seconds of real motion that a sample of the generator goes on from
+DOMINATES, LOST = 0.01, 1.0  # loss of a discriminator that is too strong, too weak
+
+
+@dataclass(frozen=True)
+class GamePreset:
+    """Settings of an adversarial training; as they stand, the paper's.
+
+    Each of its five tricks can be left out: `warmup` 0, `turns` 1, `history` 0, `balance` False,
+    `root_weight` 0.
+    """
+
+    steps: int
+    """Turns of the discriminator, after the warm-up."""
+    validate_every: int
+    """Steps from one checkpoint, and snapshot of the refiner, to the next."""
+    batch: int = 32
+    """b, windows in an update."""
+    frames: int = 50
+    """Frames in a window."""
+    warmup: int = 75
+    """Updates of each of the two in the first step."""
+    turns: int = 5
+    """The refiner's updates in every other step."""
+    history: int = 320
+    """B, refined windows of former refiners that are kept; half of what the discriminator sees."""
+    balance: bool = True
+    """Twice the refiner's turns while the discriminator's loss is under 0.01, half if above 1."""
+    root_weight: float = 20.0
+    """Lambda, of the squared distance of refined from unrefined roots, in m² (eq. 13)."""
+    refiner_rate: float = 0.002
+    """Learning rate of the refiner."""
+    discriminator_rate: float = 0.005
+    """Learning rate of the discriminator."""
+    decay: float = 0.9
+    """Of RMSProp's mean of squared gradients."""
+    clip: float = 0.0
+    """Largest norm of a gradient; 0: none is shortened, as in the paper."""
+    instance_noise: float = 0.0
+    """Deviation of noise on all that the discriminator sees; a remedy, not the paper's."""
+    spectral: bool = False
+    """Hold the discriminator's outer layers to a norm of 1; a remedy, not the paper's."""
+    width: int = 256
+    """Of the refiner's hidden layers."""
+    discriminator_width: int = 128
+    """Of the discriminator's, in each direction."""
+    samples: int = 64
+    """Motions of the generator at a time."""
+    seconds: float = 10.0
+    """Length of each of them."""
+    refresh: int = 100
+    """Steps after which they are made anew."""
+    seed: int = 0
+    """Start of all chance."""
+
+    def __post_init__(self) -> None:
+        least_one = ("steps", "validate_every", "frames", "turns", "width", "discriminator_width",
+                     "samples", "refresh")  # fmt: skip
+        wrong = [name for name in least_one if getattr(self, name) < 1]
+        wrong += [name for name in ("refiner_rate", "discriminator_rate", "seconds")
+                  if not 0 < getattr(self, name) < math.inf]  # fmt: skip
+        wrong += [name for name in ("warmup", "root_weight", "clip", "instance_noise")
+                  if not 0 <= getattr(self, name) < math.inf]  # fmt: skip
+        if self.batch < 2 or self.batch % 2:
+            wrong.append("batch (an even number)")
+        if self.history and self.history < self.batch:
+            wrong.append("history (0, or a batch and more)")
+        if not 0 <= self.decay < 1:
+            wrong.append("decay (from 0 to 1)")
+        if wrong:
+            raise TrainingError(f"These settings of a game make no sense: {', '.join(wrong)}.")
+
+
+class Game(nn.Module):
+    """Both players, and the refined windows that the discriminator is not to forget."""
+
+    def __init__(self, refiner: Refiner, discriminator: Discriminator, preset: GamePreset) -> None:
+        super().__init__()
+        self.refiner, self.discriminator = refiner, discriminator
+        empty = torch.zeros(preset.history, preset.frames, refiner.encoding.dim)
+        self.register_buffer("history", empty)
+
+
+def new_game(data: Prepared, preset: GamePreset) -> Game:
+    """Players with first weights drawn from the preset's seed."""
+    clips = data.clips("train")
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(preset.seed)
+        effectors = effector_normalizer(data.encoding, clips)
+        refiner = Refiner(data.encoding, data.normalizer, preset.width, effectors)
+        critic = Discriminator(data.encoding, deepcopy(effectors), preset.discriminator_width)
+        if preset.spectral:
+            critic.enter[0], critic.leave = (
+                spectral_norm(critic.enter[0]),
+                spectral_norm(critic.leave),
+            )
+    return Game(refiner, critic, preset)
+
+
+def train_game(
+    generator: nn.Module,
+    data: Prepared,
+    preset: GamePreset,
+    folder: str | os.PathLike,
+    *,
+    name: str,
+    device: str | None = None,
+    progress: bool = False,
+) -> list[dict]:
+    """Train a refiner against a discriminator, or go on where an earlier call was stopped.
+
+    Parameters
+    ----------
+    generator : whose motion is to be refined, such as the shipped LSTM-GMM; not changed.
+    data : real motion, in the generator's encoding.
+    folder : receives ``checkpoint.safetensors`` to go on from, ``curve.json``, and the refiner as
+        ``at-STEP.safetensors`` at every validation: which is best, an independent judge says.
+    name : of the refiner, kept with its weights.
+    device : "cpu", "cuda"; by default the best there is.
+    progress : show a bar and a line for every validation.
+
+    Returns
+    -------
+    list of dict : means since the last entry. `telling`, `fooling`: both losses, eq. 10 (halved, so
+    that 0.69 is a discriminator that knows nothing) and 9; `root (cm)`: how far roots are moved;
+    `turns`: the refiner's in a step; `seconds` of training.
+
+    Raises
+    ------
+    TrainingError : data of another encoding, the folder holds another game, or can't be written.
+    DivergedError : a loss or its gradient is no longer a number.
+    """
+    if generator.encoding.config() != data.encoding.config():
+        raise TrainingError("The generator makes features of another kind than the data's.")
+    device = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    folder, game = Path(folder), new_game(data, preset).to(device)
+    optimizer = torch.optim.RMSprop(
+        [
+            {"params": list(game.refiner.parameters()), "lr": preset.refiner_rate},
+            {"params": list(game.discriminator.parameters()), "lr": preset.discriminator_rate},
+        ],
+        alpha=preset.decay,
+    )
+    facts = {"name": name, "preset": asdict(preset), "data": data.hash,
+             "model": game.refiner.config(), "step": 0, "seconds": 0.0, "curve": []}  # fmt: skip
+    _resume(folder / CHECKPOINT, game, optimizer, facts)
+    source = _Source(generator, data, preset, device)
+    seen: dict[str, list[float]] = {"telling": [], "fooling": [], "root (cm)": [], "turns": []}
+    since = time.perf_counter()
+    shown = None if progress else True
+    bar = tqdm(total=preset.steps, initial=facts["step"], desc=name, mininterval=1, disable=shown)
+    with bar:
+        for step in range(facts["step"], preset.steps):
+            for key, value in play(game, optimizer, source, preset, step):
+                seen[key].append(value)
+            bar.update()
+            facts["step"] = step + 1
+            if facts["step"] % preset.validate_every and facts["step"] != preset.steps:
+                continue
+            facts["seconds"] += time.perf_counter() - since
+            means = {key: statistics.fmean(values) for key, values in seen.items()}
+            facts["curve"].append({"step": facts["step"], **means, "seconds": facts["seconds"]})
+            _keep(folder, game, optimizer, facts)
+            seen, since = {key: [] for key in seen}, time.perf_counter()
+            if progress:
+                bar.write(_line(facts["curve"][-1]))
+                sys.stdout.flush()
+    return facts["curve"]
+
+
+def play(
+    game: Game, optimizer: torch.optim.Optimizer, source: _Source, preset: GamePreset, step: int
+) -> Iterator[tuple[str, float]]:
+    """One step of the game, in the paper's order; yields its losses as they come."""
+    chance = torch.Generator().manual_seed(preset.seed * 1_000_003 + step)
+    opening = step == 0 and preset.warmup > 0
+    if step == 0 and preset.history:
+        with torch.no_grad():
+            game.history.copy_(game.refiner(source.generated(preset.history, step, chance)))
+    for _ in range(preset.warmup if opening else 1):
+        telling = _tell(game, optimizer, source, preset, step, chance)
+        yield "telling", telling
+    turns = preset.turns
+    if preset.balance:
+        turns = (
+            2 * turns if telling < DOMINATES else max(1, turns // 2) if telling > LOST else turns
+        )
+    turns = preset.warmup if opening else turns
+    yield "turns", turns
+    for _ in range(turns):
+        fooling, moved = _fool(game, optimizer, source, preset, step, chance)
+        yield "fooling", fooling
+        yield "root (cm)", moved
+
+
+def _tell(game, optimizer, source, preset, step, chance) -> float:
+    """The discriminator learns once (eq. 10); the history gets what it saw for the first time."""
+    half = preset.batch // 2 if preset.history else preset.batch
+    with torch.no_grad():
+        refined = new = game.refiner(source.generated(half, step, chance))
+    if preset.history:
+        places = torch.randperm(preset.history, generator=chance)[:half]
+        refined = torch.cat([new, game.history[places]])
+    real = source.real(preset.batch, chance)
+    judge = lambda windows: _judged(game.discriminator, windows, preset, chance)
+    loss = telling_loss(judge(real), judge(refined)) / 2
+    _descend(loss, game.discriminator, optimizer, preset, step)
+    if preset.history:
+        game.history[torch.randperm(preset.history, generator=chance)[:half]] = new
+    return loss.item()
+
+
+def _fool(game, optimizer, source, preset, step, chance) -> tuple[float, float]:
+    """The refiner learns once (eq. 13): the loss of eq. 9, and centimetres that roots are moved."""
+    features = source.generated(preset.batch, step, chance)
+    refined = game.refiner(features)
+    fooling = fooling_loss(_judged(game.discriminator, refined, preset, chance))
+    away = root_deviation(game.refiner.encoding, features, refined)
+    _descend(fooling + preset.root_weight * away, game.refiner, optimizer, preset, step)
+    return fooling.item(), 100 * away.item() ** 0.5
+
+
+def _judged(critic: Discriminator, windows: Tensor, preset: GamePreset, chance) -> Tensor:
+    seen = critic.seen(windows)
+    if preset.instance_noise:
+        seen = seen + preset.instance_noise * torch.randn(seen.shape, generator=chance).to(seen)
+    return critic.judge(seen)
+
+
+def _descend(loss: Tensor, player: nn.Module, optimizer, preset: GamePreset, step: int) -> None:
+    """One step of one player; the optimiser leaves alone what has no gradient."""
+    optimizer.zero_grad(set_to_none=True)
+    parameters = list(player.parameters())
+    loss.backward(inputs=parameters)
+    norm = nn.utils.clip_grad_norm_(parameters, preset.clip or math.inf)
+    if not norm.isfinite():
+        raise DivergedError(
+            f"Step {step}: the {type(player).__name__.lower()}'s loss is {loss.item():g} and its "
+            "gradient is not a number. Play with lower rates, or a clip, in a new folder."
+        )
+    optimizer.step()
+
+
+class _Source:
+    """Where windows come from: real ones, and the generator's, sampled ahead and made anew."""
+
+    def __init__(self, generator, data: Prepared, preset: GamePreset, device) -> None:
+        self.generator, self.preset, self.device = generator, preset, device
+        self._real = Windows(data.clips("train"), preset.frames)
+        self._begun = Windows(data.clips("train"), round(OBSERVED * data.encoding.fps))
+        self._made: Windows | None = None
+        self._round = -1
+
+    def real(self, size: int, chance: torch.Generator) -> Tensor:
+        return self._real.draw(size, chance).to(self.device)
+
+    def generated(self, size: int, step: int, chance: torch.Generator) -> Tensor:
+        if step // self.preset.refresh != self._round:
+            self._round = step // self.preset.refresh
+            motions = sample_motions(self.generator, self._begun, self.preset, self._round)
+            self._made = Windows(motions, self.preset.frames)
+        return self._made.draw(size, chance).to(self.device)
+
+
+@torch.no_grad()
+def sample_motions(generator, begun: Windows, preset: GamePreset, number: int) -> list[Tensor]:
+    """Motions (frames, dim) that go on from real ones, as the generator is used; number: of the draw.
+
+    A motion that has left all bounds is NaN, and is drawn again.
+    """
+    frames, found = round(preset.seconds * generator.fps), []
+    for attempt in count():
+        chance = torch.Generator().manual_seed(preset.seed * 1_000_003 + 997 * number + attempt)
+        start = generator.observe(begun.draw(preset.samples, chance))
+        made = generator.generate(frames, start, generator=chance, **generator.sampling)
+        found += [motion for motion in made if motion.isfinite().all()]
+        if len(found) >= preset.samples:
+            return found[: preset.samples]
+        if attempt == 9:
+            raise TrainingError("Nearly all motions of this generator explode; nothing to refine.")
+
+
+def _resume(path: Path, game: Game, optimizer, facts: dict) -> None:
+    """Go on from a checkpoint if there is one."""
+    if not path.exists():
+        return
+    tensors, found = read_checkpoint(path)
+    same = ("name", "data", "model")
+    before, now = dict(found.get("preset", {})), dict(facts["preset"])
+    other = [key for key in same if found.get(key) != facts[key]]
+    other += [key for key in now if key != "steps" and before.get(key) != now[key]]
+    if other:
+        raise TrainingError(
+            f"{path}: belongs to a game with other {', '.join(other)}; repeat its settings to go on "
+            "with it, or name another folder."
+        )
+    restore(tensors, game, optimizer)
+    facts |= {key: found[key] for key in ("step", "seconds", "curve")}
+
+
+def _keep(folder: Path, game: Game, optimizer, facts: dict) -> None:
+    save_weights(folder / f"at-{facts['step']}.safetensors", game.refiner, facts)
+    text = json.dumps(facts["curve"], indent=1).encode()
+    try:
+        write_whole(folder / "curve.json", lambda stream: stream.write(text))
+    except OSError as error:
+        raise TrainingError(f"{folder}: can't be written to ({error.strerror}).") from error
+    save_checkpoint(folder / CHECKPOINT, game, optimizer, facts)  # last: it says that all is done
+
+
+def _line(point: dict) -> str:
+    return (
+        f"step {point['step']:6}  {point['seconds'] / 60:6.1f} min  telling {point['telling']:.3f}  "
+        f"fooling {point['fooling']:.3f}  root {point['root (cm)']:.1f} cm  turns {point['turns']:.1f}"
+    )
