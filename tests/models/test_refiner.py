@@ -100,6 +100,19 @@ def test_the_discriminator_sees_end_effectors_alone(world):
         assert (critic(flipped) - critic(features)).abs().max() > 1e-4
 
 
+def test_slow_feet_can_be_enlarged(world):
+    encoding, features, _, critic = world
+    close = Discriminator(encoding, critic.effectors, 12, slow=0.1)
+    velocities = encoding.end_effectors(features)[..., 3:].flatten(-2)
+    extra = torch.asinh(velocities / 0.1)
+    plain, seen = critic.seen(features), close.seen(features)
+    moving = len(critic.effectors.mean)
+    assert torch.equal(seen[..., :moving], plain[..., :moving])
+    assert torch.allclose(seen[..., moving : moving + extra.shape[-1]], extra, atol=1e-6)
+    assert torch.equal(seen[..., moving + extra.shape[-1] :], plain[..., moving:])
+    assert close(features).shape == features.shape[:2]
+
+
 def test_it_looks_both_ways(world):
     _, features, _, critic = world
     changed = features.clone()

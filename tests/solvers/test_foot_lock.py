@@ -10,7 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionlab import contacts
+from motionlab import Skeleton, contacts
 from motionlab.contacts import foot_points
 from motionlab.datasets import gaits
 from motionlab.errors import ModelError
@@ -151,6 +151,29 @@ def test_own_contacts_and_those_of_both_parts_of_a_foot_are_understood():
     assert torch.equal(lock_feet(replace(motion, contacts=four)).positions(), same)
     found = lock_feet(motion, contacts.label(motion))
     assert found.positions().isfinite().all()
+
+
+def test_a_foot_without_a_toe_joint_is_held_by_its_end():
+    skeleton = gaits.make(seconds=1).skeleton
+    toes = [skeleton.index(f"{side}_toes") for side in ("left", "right")]
+    keep = [joint for joint in range(skeleton.joints) if joint not in toes]
+    number = {joint: i for i, joint in enumerate(keep)} | {-1: -1}
+    ends = [i for i, joint in enumerate(skeleton.end_parents) if joint not in toes]
+    short = Skeleton(
+        tuple(skeleton.names[j] for j in keep),
+        tuple(number[skeleton.parents[j]] for j in keep),
+        skeleton.offsets[keep],
+        (
+            *(number[skeleton.end_parents[i]] for i in ends),
+            *(number[skeleton.parents[t]] for t in toes),
+        ),
+        torch.cat([skeleton.end_offsets[ends], skeleton.offsets[toes]]),
+    )
+    motion, down = sliding()
+    cut = replace(motion, skeleton=short, rotations=motion.rotations[:, keep], contacts=None)
+    locked = lock_feet(cut, down)
+    assert held_steps(cut, down).mean() > 3
+    assert held_steps(locked, down).max() < 0.1
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,8 @@ class Counted:
         (1, {}, 1.1, (1, 2)),
         (1, {"turns": 1}, 1.1, (1, 1)),
         (1, {"balance": False}, 0.009, (1, 5)),
+        (1, {"strong": 0.5, "weak": 0.6}, 0.49, (1, 10)),
+        (1, {"strong": 0.5, "weak": 0.6}, 0.61, (1, 2)),
     ],
 )
 def test_turns_are_those_of_the_paper(monkeypatch, gaits, step, other, telling, expected):
@@ -140,7 +142,7 @@ def test_half_a_batch_of_the_history_is_exchanged_in_each_turn(gaits, generator)
 @pytest.mark.parametrize(
     "other",
     [{"warmup": 0}, {"turns": 1}, {"history": 0}, {"balance": False}, {"root_weight": 0.0},
-     {"instance_noise": 0.1}, {"spectral": True}, {"clip": 1.0}],
+     {"instance_noise": 0.1}, {"spectral": True}, {"clip": 1.0}, {"slow": 0.1}],
 )  # fmt: skip
 def test_every_trick_can_be_left_out_and_every_remedy_taken(game, tmp_path, other):
     assert len(game(tmp_path, replace(SMALL, **other))) == 2

@@ -47,6 +47,10 @@ def test_survival_falls_by_one_rollout_at_every_failure():
     assert axes.lines[0].get_xydata().tolist() == [
         [0.005, 1], [5, 0.75], [20, 0.5], [100, 0.5]
     ]  # fmt: skip
+    (axes,) = plots.survival({"a": [1.0], "b": [2.0], "a, again": [3.0]}, horizon=100.0).axes
+    a, b, again = axes.lines
+    assert a.get_color() == again.get_color() != b.get_color()
+    assert a.get_linestyle() == b.get_linestyle() != again.get_linestyle()
     with pytest.raises(ViewerError, match="0 or more"):
         plots.survival({"one": [np.nan]}, horizon=100.0)
 

@@ -112,24 +112,37 @@ class Discriminator(nn.Module):
     encoding : of the motions.
     effectors : as of `Refiner`.
     width : of the hidden layers, the LSTM's in each direction.
+    slow : metres a second. If given, it sees each velocity v as asinh(v / slow), too: beside a
+        hand's metres a second, the centimetres of a foot that slides are next to nothing. Not the
+        paper's.
     """
 
     def __init__(
-        self, encoding: JointAngles, effectors: Normalizer | None = None, width: int = 128
+        self,
+        encoding: JointAngles,
+        effectors: Normalizer | None = None,
+        width: int = 128,
+        slow: float | None = None,
     ) -> None:
         super().__init__()
         self.encoding, self.effectors = encoding, _checked(encoding, effectors)
+        self.slow = slow
         contacts = encoding.slices.get("contacts", slice(0, 0))
         seen = len(self.effectors.mean) + contacts.stop - contacts.start
+        seen += len(self.effectors.mean) // 2 if slow else 0
         self.enter = nn.Sequential(nn.Linear(seen, width), nn.ReLU())
         self.lstm = nn.LSTM(width, width, batch_first=True, bidirectional=True)
         self.leave = nn.Linear(2 * width, 1)
 
     def seen(self, features: Tensor) -> Tensor:
-        """All that it sees of features (batch, frames, dim): (batch, frames, 6 a joint + contacts)."""
-        moving = self.effectors(self.encoding.end_effectors(features).flatten(-2))
-        contacts = self.encoding.contacts(features)
-        return moving if contacts is None else torch.cat([moving, contacts], dim=-1)
+        """All that it sees of features (batch, frames, dim): (batch, frames, numbers)."""
+        moving = self.encoding.end_effectors(features)
+        seen = [self.effectors(moving.flatten(-2))]
+        if self.slow:
+            seen.append((moving[..., 3:] / self.slow).asinh().flatten(-2))
+        if "contacts" in self.encoding.slices:
+            seen.append(self.encoding.contacts(features))
+        return torch.cat(seen, dim=-1)
 
     def forward(self, features: Tensor) -> Tensor:
         """Logits (batch, frames) of being real: above 0 where it takes a frame for real."""

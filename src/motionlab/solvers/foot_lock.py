@@ -29,6 +29,7 @@ FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, w
 FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
 BLEND = 0.25  # seconds from a foot's own way to where it is held
 REACH = 0.97  # share of its length to which a leg may be stretched; near 1 knees snap
+STRAIGHT = 0.02  # metres that a knee lies beside its leg; if less, the thigh says where it points
 SETTLE = 0.15  # seconds over which the body comes down if a leg is too short
 
 
@@ -257,7 +258,7 @@ def _bent(
             @ world[..., lower, :, :],
             foot: world[..., foot, :, :],
         }
-        if toes != foot:
+        if foot != toes < skeleton.joints:  # a joint, not the end of the foot
             turned[toes] = _toes_up(skeleton, side, points, world, shift, ground, toes, i)
         for joint, whole in turned.items():
             parent = skeleton.parents[joint]
@@ -291,7 +292,7 @@ def _knee_direction(points: Tensor, world: Tensor, upper: int, lower: int, foot:
     front = front - (front * line).sum(-1, keepdim=True) * line
     backwards = (aside * front).sum(-1, keepdim=True) < 0
     aside = torch.where(backwards, torch.zeros_like(aside), aside)
-    return aside + 0.02 * (0.02 - aside.norm(dim=-1, keepdim=True)).clamp(min=0) * 50 * front
+    return aside + (STRAIGHT - aside.norm(dim=-1, keepdim=True)).clamp(min=0) * front
 
 
 _PARTS = ("upper_leg", "lower_leg", "foot", "toes")

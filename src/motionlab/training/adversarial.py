@@ -33,7 +33,6 @@ from .prepared import Prepared
 from .windows import Windows
 
 OBSERVED = 2.0  # seconds of real motion that a sample of the generator goes on from
-DOMINATES, LOST = 0.01, 1.0  # loss of a discriminator that is too strong, too weak
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,11 @@ class GamePreset:
     history: int = 320
     """B, refined windows of former refiners that are kept; half of what the discriminator sees."""
     balance: bool = True
-    """Twice the refiner's turns while the discriminator's loss is under 0.01, half if above 1."""
+    """Twice the refiner's turns while the discriminator is too strong, half if too weak."""
+    strong: float = 0.01
+    """Loss of a discriminator that is too strong."""
+    weak: float = 1.0
+    """Loss of one that is too weak."""
     root_weight: float = 20.0
     """Lambda, of the squared distance of refined from unrefined roots, in m² (eq. 13)."""
     refiner_rate: float = 0.002
@@ -72,6 +75,8 @@ class GamePreset:
     """Largest norm of a gradient; 0: none is shortened, as in the paper."""
     instance_noise: float = 0.0
     """Deviation of noise on all that the discriminator sees; a remedy, not the paper's."""
+    slow: float = 0.0
+    """Metres a second below which the discriminator sees velocities enlarged (see there); 0: not."""
     spectral: bool = False
     """Hold the discriminator's outer layers to a norm of 1; a remedy, not the paper's."""
     width: int = 256
@@ -93,7 +98,7 @@ class GamePreset:
         wrong = [name for name in least_one if getattr(self, name) < 1]
         wrong += [name for name in ("refiner_rate", "discriminator_rate", "seconds")
                   if not 0 < getattr(self, name) < math.inf]  # fmt: skip
-        wrong += [name for name in ("warmup", "root_weight", "clip", "instance_noise")
+        wrong += [name for name in ("warmup", "root_weight", "clip", "instance_noise", "slow")
                   if not 0 <= getattr(self, name) < math.inf]  # fmt: skip
         if self.batch < 2 or self.batch % 2:
             wrong.append("batch (an even number)")
@@ -122,7 +127,9 @@ def new_game(data: Prepared, preset: GamePreset) -> Game:
         torch.manual_seed(preset.seed)
         effectors = effector_normalizer(data.encoding, clips)
         refiner = Refiner(data.encoding, data.normalizer, preset.width, effectors)
-        critic = Discriminator(data.encoding, deepcopy(effectors), preset.discriminator_width)
+        critic = Discriminator(
+            data.encoding, deepcopy(effectors), preset.discriminator_width, preset.slow or None
+        )
         if preset.spectral:
             critic.enter[0], critic.leave = (
                 spectral_norm(critic.enter[0]),
@@ -215,10 +222,10 @@ def play(
         telling = _tell(game, optimizer, source, preset, step, chance)
         yield "telling", telling
     turns = preset.turns
-    if preset.balance:
-        turns = (
-            2 * turns if telling < DOMINATES else max(1, turns // 2) if telling > LOST else turns
-        )
+    if preset.balance and telling < preset.strong:
+        turns = 2 * turns
+    elif preset.balance and telling > preset.weak:
+        turns = max(1, turns // 2)
     turns = preset.warmup if opening else turns
     yield "turns", turns
     for _ in range(turns):

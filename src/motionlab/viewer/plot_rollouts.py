@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
@@ -14,7 +15,7 @@ from ..errors import ViewerError
 from ..metrics import heading_frame
 from ..skeleton import Skeleton
 from . import palette
-from .plot_style import check_named, styled
+from .plot_style import DASHES, check_named, styled
 
 
 @styled
@@ -25,11 +26,16 @@ def survival(lines: Mapping[str, Sequence[float]], horizon: float) -> Figure:
     ----------
     lines : {name: seconds until failure, one a rollout}, infinite for one that never failed.
     horizon : seconds for which all of them were watched.
+
+    Names that differ after a comma only have one colour, and other dashes.
     """
     check_named("survival", lines)
+    kinds = list(dict.fromkeys(name.partition(",")[0] for name in lines))
+    drawn: Counter[str] = Counter()
     figure, axes = plt.subplots(figsize=(7.5, 3.6))
     first = horizon / 20_000
-    for index, (name, seconds) in enumerate(lines.items()):
+    for name, seconds in lines.items():
+        kind = name.partition(",")[0]
         seconds = np.sort(np.asarray(seconds, dtype=float))
         if not len(seconds) or not (seconds >= 0).all():  # NaN is not
             raise ViewerError(f"survival: {name!r} needs seconds of 0 or more; it has {seconds}.")
@@ -37,8 +43,9 @@ def survival(lines: Mapping[str, Sequence[float]], horizon: float) -> Figure:
         going = 1 - np.arange(len(failed) + 1) / len(seconds)
         axes.step(
             [first, *failed, horizon], [*going, going[-1]], where="post", label=name,
-            color=palette.color(name, index), lw=2,
+            color=palette.color(kind, kinds.index(kind)), lw=2, ls=DASHES[drawn[kind] % len(DASHES)],
         )  # fmt: skip
+        drawn[kind] += 1
     axes.set(xscale="log", xlim=(first, horizon), ylim=(-0.03, 1.03))
     axes.set(xlabel="time (s)", ylabel="share still going")
     axes.xaxis.set_major_formatter("{x:g}")

@@ -23,6 +23,7 @@ AROUND_ZERO = ListedColormap(
     [(0.30, 0.53, 0.85, abs(x) ** 0.7) if x < 0 else (0.87, 0.36, 0.22, x**0.7)
      for x in np.linspace(-1, 1, 256)]
 )  # fmt: skip
+DASHES = ("-", "--", ":", "-.")  # of lines that have one colour
 INK = "#808080"  # as the style's text: 4:1 on white and on black
 
 

@@ -19,6 +19,7 @@ from . import palette
 from .plot_rollouts import pauses, recurrence, survival
 from .plot_style import (
     AROUND_ZERO,
+    DASHES,
     INK,
     SPEED,
     check_motion,
@@ -109,9 +110,6 @@ def bars(values: Sequence[float], names: Sequence[str], label: str, log: bool = 
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
     return figure
-
-
-DASHES = ("-", "--", ":", "-.")
 
 
 @styled
