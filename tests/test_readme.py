@@ -72,12 +72,14 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     from motionlab.datasets import gaits
 
     commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", README, re.MULTILINE)
-    sample, dance, prepare, train, tune, again, dancer = map(str.split, commands)
+    sample, still, dance, prepare, train, tune, again, dancer = map(str.split, commands)
     # these need data, and minutes or hours
     assert (prepare, train[0], dancer[0]) == (["prepare", "locomotion"], "train", "train")
     monkeypatch.chdir(tmp_path)
     assert main(sample) == 0
     assert read_bvh("walk.bvh").seconds == 30
+    assert main(still) == 0
+    assert read_bvh("still_feet.bvh").seconds == 10
     assert main(dance) == 0
     assert read_bvh("dance.bvh").seconds == 30
     (tmp_path / "my_clips").mkdir()

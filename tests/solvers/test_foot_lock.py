@@ -136,6 +136,19 @@ def test_the_floor_is_where_it_is_said_to_be_or_where_toes_rest():
     )
 
 
+def test_a_rest_pose_that_hangs_from_its_root_has_a_floor_too():
+    motion, down = sliding()
+    skeleton = motion.skeleton
+    lifted = skeleton.offsets.clone()
+    lifted[0] = 0
+    hanging = replace(skeleton, offsets=lifted)
+    same = replace(motion, skeleton=hanging)
+    assert torch.allclose(same.positions(), motion.positions(), atol=1e-5)
+    locked = lock_feet(same, down, floor=None).positions()
+    # its lowest joint stands for the sole, which is up to 3 cm lower
+    assert (locked - lock_feet(motion, down, floor=None).positions()).norm(dim=-1).max() < 0.03
+
+
 def test_gaps_are_filled_and_flickers_left_out():
     row = torch.tensor([int(x) for x in "0011110111100010000"]).bool()[:, None].repeat(1, 2)
     clean = "".join(str(int(x)) for x in _clean(row, 30)[:, 0])

@@ -1,12 +1,15 @@
 """`motionlab sample`, `motionlab evaluate`, and training that begins with shipped weights."""
 
 import json
+from dataclasses import replace
 
 import pytest
 import torch
 
 import motionlab
 from motionlab.__main__ import main
+from motionlab.encodings import JointAngles
+from motionlab.solvers import lock_feet
 
 
 @pytest.fixture
@@ -42,6 +45,26 @@ def test_sample_options_reach_the_model(here, shipped):
         assert not torch.equal(usual, sampled(*options)), options
     name = motionlab.load(shipped).start_names[2]
     assert torch.equal(sampled("--start", "2"), sampled("--start", name))
+
+
+@pytest.mark.parametrize("knows_contacts", [True, False])
+def test_sample_with_locked_feet(here, shipped, monkeypatch, knows_contacts):
+    """Labelled by the network, or by speed where it has no labels."""
+    model = motionlab.load(shipped)
+    with torch.no_grad():
+        chance = torch.Generator().manual_seed(0)
+        made = model.generate(60, model.starts[0], temperature=0.5, generator=chance)[0]
+    motion = model.encoding.to_motion(made)
+    down = motion.contacts if knows_contacts else motionlab.contacts.label(motion)
+    if not knows_contacts:
+        blind = lambda self, *a, **k: replace(to_motion(self, *a, **k), contacts=None)
+        to_motion = JointAngles.to_motion
+        monkeypatch.setattr(JointAngles, "to_motion", blind)
+    assert main(["sample", str(shipped), "--seconds", "2", "--out", "a.bvh", "--lock-feet"]) == 0
+    expected = lock_feet(motion, down, floor=None).positions()
+    assert (expected - motion.positions()).abs().max() > 0.01
+    written = motionlab.read_bvh("a.bvh").positions()
+    torch.testing.assert_close(written, expected, rtol=0, atol=1e-3)
 
 
 def test_sample_of_several_characters(here, shipped, capsys):

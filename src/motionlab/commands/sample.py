@@ -7,11 +7,14 @@ import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, TrainingError
+
+if TYPE_CHECKING:
+    from ..motion import Motion
 
 LONG, MOST = 30_000, 1_000_000  # frames, of all characters: some ten seconds of work; of memory
 
@@ -38,6 +41,8 @@ class Sample:
     """Start of all chance."""
     characters: int = 1
     """How many, each with a chance of its own."""
+    lock_feet: Annotated[bool, arg(name="lock-feet")] = False
+    """Hold toes still while they are in contact: as the network says, or else while they are slow."""
 
     def run(self) -> None:
         import torch
@@ -65,6 +70,8 @@ class Sample:
             model.encoding.to_motion(each, name=path.stem, source=self.model)
             for each, path in zip(features, paths, strict=True)
         ]
+        if self.lock_feet:
+            motions = [locked(motion) for motion in motions]
         for motion, path, start in zip(motions, paths, chosen, strict=True):
             write_bvh(motion, path)
             print(f"{path}: {motion.seconds:.1f} s from {model.start_names[start]!r}")
@@ -106,6 +113,15 @@ class Sample:
             return [found[0]] * self.characters
         listed = "; ".join(f"{i} {name}" for i, name in enumerate(names))
         raise MotionLabError(f"--start {self.start}: there is none. {self.model} has {listed}.")
+
+
+def locked(motion: Motion) -> Motion:
+    """The motion with its toes held still on the level where they rest."""
+    from ..contacts import label
+    from ..solvers import lock_feet
+
+    found = label(motion) if motion.contacts is None else motion.contacts
+    return lock_feet(motion, found, floor=None)
 
 
 def given(command: object) -> dict[str, float]:

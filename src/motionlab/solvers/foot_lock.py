@@ -98,7 +98,7 @@ def lock(
     points, world = _forward(skeleton, root_positions, rotations)
     toes = points[..., joints["toes"], :]  # (..., frames, 2, 3)
     held = _clean(contacts & (_slowest(toes) * fps < FASTEST), fps)
-    ground = _ground(toes, held, rest_heights(skeleton)[[1, 3]].to(toes), floor)
+    ground = _ground(toes, held, _toe_heights(skeleton).to(toes), floor)
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
         held = held & (_onto_places(toes, held, ground).norm(dim=-1) < FARTHEST)
     shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
@@ -150,6 +150,13 @@ def _distance(marks: Tensor, before: bool) -> Tensor:
     return following - frames
 
 
+def _toe_heights(skeleton: Skeleton) -> Tensor:
+    """Heights (2,) of toe joints above the floor when a foot stands flat."""
+    heights = rest_heights(skeleton)
+    # many a rest pose hangs from a root at the origin: its lowest foot joint stands, then
+    return heights[[1, 3]] - heights.amin().clamp(max=0)
+
+
 def _ground(toes: Tensor, held: Tensor, rest: Tensor, floor: float | None) -> Tensor:
     """Heights (..., 2) of resting toe joints: the plane of contact."""
     if floor is not None:
@@ -197,7 +204,7 @@ def _fading(distance: Tensor, blend: float) -> Tensor:
 
 def _above(shift: Tensor, points: Tensor, joints: dict, ground: Tensor, skeleton: Skeleton):
     """The shift, with feet lifted where they would be in the floor: ankles and toe joints."""
-    rest = rest_heights(skeleton)[[1, 3]].to(points)
+    rest = _toe_heights(skeleton).to(points)
     floor = (ground - rest)[..., None, :]  # (..., 1, 2)
     toe = points[..., joints["toes"], 1] + shift[..., 1] - ground[..., None, :]
     ankle = points[..., joints["foot"], 1] + shift[..., 1] - floor
@@ -271,7 +278,7 @@ def _toes_up(skeleton, side, points, world, shift, ground, toes, i) -> Tensor:
     """World orientation of the toes, pitched up where their tip would be in the floor."""
     ends = zip(skeleton.end_parents, skeleton.end_offsets, strict=True)
     tip = next((offset for parent, offset in ends if parent == toes), torch.zeros(3))
-    rest = rest_heights(skeleton)[2 * i + 1].to(points)
+    rest = _toe_heights(skeleton)[i].to(points)
     height = points[..., toes, 1] + shift[..., i, 1] - (ground[..., i] - rest)[..., None]
     flat = world[..., toes, :, :].reshape(-1, 3, 3)
     return off_the_floor(flat, height.reshape(-1), tip.to(flat)).reshape(
