@@ -175,9 +175,10 @@ def test_rounded_weights_begin_the_same_motion(features, precision, tolerance):
     torch.manual_seed(0)
     model = LstmGmm(encoding, Normalizer.fit(list(clips)), width=32, components=1)
     start, calm = model.observe(clips), {"temperature": 1e-6}
-    exact = model.normalizer(model.generate(5, start, **calm))
-    found = model.normalizer(model.generate(5, start, **calm, precision=precision))
-    assert 0 < (found - exact).abs().max() < tolerance
+    for many in (start[[0]], start[[0, 1] * 4]):  # few and many are multiplied in other ways
+        exact = model.normalizer(model.generate(5, many, **calm))
+        found = model.normalizer(model.generate(5, many, **calm, precision=precision))
+        assert 0 < (found - exact).abs().max() < tolerance
 
 
 @rounds
@@ -234,5 +235,7 @@ def test_who_leaves_all_bounds_ends_in_nan_alone(model, start):
     if model.skip:
         assert not made[2].isfinite().all()
         if can_round(made):
-            with pytest.raises(ModelError, match="left all bounds"):
-                model.generate(5, start, precision="int8")
+            alone = model.generate(5, start, precision="int8")
+            assert alone[[0, 1, 3]].isfinite().all() and not alone[2].isfinite().all()
+            with pytest.raises(ModelError, match="left all bounds"):  # many share their steps
+                model.generate(5, start[[0, 1, 2, 3, 3]], precision="int8")

@@ -205,10 +205,10 @@ class LstmGmm(Recurrent):
         component_temperature : the same for the choice among the M components.
         noise : standard deviation of what is added to the network's inputs, in normalised units
             (the d of section 5.1; 0.05 in training).
-        precision : of the weights. "full" is theirs. "half" draws one or a few characters
-            faster, "int8" hundreds (it rounds what is multiplied, too): nearly the same
-            distribution, another motion. Both only in ``torch.no_grad()``, on x86 processors. Of
-            weights that were stored in half precision "half" loses nothing.
+        precision : of the weights. "full" is theirs. "int8" draws faster, one character or
+            hundreds: nearly the same distribution, another motion (it rounds what is multiplied,
+            too). "half" draws one or a few faster, and of weights that were stored in half
+            precision it loses nothing. Both only in ``torch.no_grad()``, on x86 processors.
 
         Raises
         ------

@@ -5,8 +5,8 @@ remembers how it was computed, features stay normalised from the first frame to 
 LSTM layer multiplies once, [input, h] by [W_input, W_h].
 
 How fast can it be? One character reads all weights for each frame: 19 MB at width 512. Hundreds
-read them once for all and wait for the multiplications. So fewer bytes help the one, smaller
-numbers the other: the two roundings in `PRECISIONS`.
+read them once for all and wait for the multiplications. Fewer bytes help the one, smaller numbers
+the others: hence the roundings in `PRECISIONS`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from .state import State
 
 _rounded: WeakKeyDictionary[LstmGmm, tuple[list, list]] = WeakKeyDictionary()
+BLOCK = 32  # numbers that a product of whole weights takes at a time
+FEW = 4  # characters for whom reading the weights takes longer than multiplying
 Linear = Callable[[Tensor], Tensor]  # (batch, in) -> (batch, out)
 
 
@@ -146,8 +148,11 @@ def _int8(weight: Tensor, bias: Tensor) -> Linear:
     whole = (weight / scale[:, None]).round_().to(torch.int8)
     packed = torch.ops.onednn.qlinear_prepack(whole, None)
     zeros = torch.zeros(len(scale), dtype=torch.int32)
+    for_few = _int8_for_few(whole, scale, bias)
 
     def product(inputs: Tensor) -> Tensor:
+        if len(inputs) <= FEW:
+            return for_few(inputs)
         low, high = (edge.item() for edge in inputs.aminmax())
         if not math.isfinite(high - low):
             raise ModelError(
@@ -157,10 +162,28 @@ def _int8(weight: Tensor, bias: Tensor) -> Linear:
         step = max(high - low, 1e-6) / 127
         zero = round(-low / step)
         half = inputs.new_tensor(zero + 0.5)  # conversion cuts off what is behind the point
-        whole = torch.add(half, inputs, alpha=1 / step).to(torch.uint8)
+        steps = torch.add(half, inputs, alpha=1 / step).to(torch.uint8)
         return torch.ops.onednn.qlinear_pointwise(
-            whole, step, zero, packed, scale, zeros, bias, 1.0, 0, torch.float32, "none", [], ""
+            steps, step, zero, packed, scale, zeros, bias, 1.0, 0, torch.float32, "none", [], ""
         )
+
+    return product
+
+
+def _int8_for_few(whole: Tensor, scale: Tensor, bias: Tensor) -> Linear:
+    """The same weights for characters who wait for them, and not for the products.
+
+    Inputs and sums are bfloat16 then, eight bits each: there is nothing to choose by the batch.
+    """
+    rows, columns = whole.shape
+    beyond = -columns % BLOCK  # the product reads on to the end of a block
+    whole = functional.pad(whole, (0, beyond, 0, -rows % BLOCK))
+    ones = torch.ones(len(whole), dtype=torch.bfloat16)  # scales; ours have more digits
+
+    def product(inputs: Tensor) -> Tensor:
+        short = functional.pad(inputs, (0, beyond)).bfloat16()
+        sums = torch._weight_int8pack_mm(short, whole, ones)[:, :rows]
+        return torch.addcmul(bias, sums.float(), scale)
 
     return product
 
