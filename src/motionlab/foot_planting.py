@@ -66,7 +66,7 @@ def find_contacts(ankle: Tensor, toes: Tensor, foot: Tensor, speed: Tensor, fps:
     height = points[..., 1].numpy()
     lowest = minimum_filter1d(height, 2 * round(_NEAR * fps) + 1, axis=0)
     above = torch.from_numpy(height - lowest)
-    step = _steps(points) * fps
+    step = steps(points) * fps
     low = (above < torch.tensor(_HEIGHT)) | ((above < _STILL_HEIGHT) & (step < _STILL))
     found = low & (step < (_SPEED + _SLIP * speed)[:, None])
     toes_up = torch.asin(foot[:, 1, 2].clamp(-1, 1))
@@ -81,15 +81,16 @@ def find_contacts(ankle: Tensor, toes: Tensor, foot: Tensor, speed: Tensor, fps:
     return torch.from_numpy(found)
 
 
-def _steps(points: Tensor) -> Tensor:
-    """Distance (frames, points) to the frame before or after, whichever is nearer.
+def steps(points: Tensor) -> Tensor:
+    """Distance (..., frames, points) to the frame before or after, whichever is nearer.
 
-    What came to rest in a frame is at rest in it already.
+    What came to rest in a frame is at rest in it already. points : (..., frames, points, 3).
     """
-    if len(points) == 1:
-        return torch.zeros(points.shape[:-1])
-    step = (points[1:] - points[:-1]).norm(dim=-1)
-    return torch.minimum(torch.cat([step[:1], step]), torch.cat([step, step[-1:]]))
+    if points.shape[-3] == 1:
+        return points.new_zeros(points.shape[:-1])
+    step = points.diff(dim=-3).norm(dim=-1)
+    before = torch.cat([step[..., :1, :], step], dim=-2)
+    return torch.minimum(before, torch.cat([step, step[..., -1:, :]], dim=-2))
 
 
 def levelled(foot: Tensor, ankle: Tensor, toes: Tensor, fps: float) -> Tensor:
@@ -97,7 +98,7 @@ def levelled(foot: Tensor, ankle: Tensor, toes: Tensor, fps: float) -> Tensor:
 
     Rest poses know little of how a foot stands. A foot that never rests stays as it is.
     """
-    still = (_steps(torch.stack([ankle, toes], 1)) * fps < _STILL).all(1)
+    still = (steps(torch.stack([ankle, toes], 1)) * fps < _STILL).all(1)
     if int(still.sum()) < _RESTED * fps:
         return foot
     pitch = torch.asin(foot[still][:, 1, 2].clamp(-1, 1)).median()

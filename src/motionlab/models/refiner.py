@@ -180,12 +180,7 @@ def effector_normalizer(encoding: JointAngles, clips: list[Tensor]) -> Normalize
 
     clips : list of features (frames, dim), the training split.
     """
-    found = torch.cat([encoding.end_effectors(clip).flatten(-2) for clip in clips])
-    normalizer = Normalizer(found.shape[-1])
-    std, mean = torch.std_mean(found.double(), dim=0, correction=0)
-    normalizer.mean.copy_(mean)
-    normalizer.std.copy_(std.clamp(min=1e-3))
-    return normalizer
+    return Normalizer.fit([encoding.end_effectors(clip).flatten(-2) for clip in clips])
 
 
 def _checked(encoding: JointAngles, effectors: Normalizer | None) -> Normalizer:

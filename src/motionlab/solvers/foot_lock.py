@@ -16,7 +16,7 @@ from torch.nn.functional import max_pool1d, pad
 
 from ..contacts import foot_points, rest_heights
 from ..errors import ModelError
-from ..foot_planting import off_the_floor
+from ..foot_planting import off_the_floor, steps
 from ..ik.limb import two_bone
 from ..kinematics import forward_kinematics
 from ..motion import Motion
@@ -24,6 +24,7 @@ from ..rest_alignment import below, shortest_turn
 from ..skeleton import Skeleton
 
 SIDES = ("left", "right")
+PARTS = ("upper_leg", "lower_leg", "foot", "toes")
 GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
 FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, whatever its label
 FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
@@ -97,7 +98,7 @@ def lock(
     joints = _legs(skeleton)
     points, world = _forward(skeleton, root_positions, rotations)
     toes = points[..., joints["toes"], :]  # (..., frames, 2, 3)
-    held = _clean(contacts & (_slowest(toes) * fps < FASTEST), fps)
+    held = _clean(contacts & (steps(toes) * fps < FASTEST), fps)
     ground = _ground(toes, held, _toe_heights(skeleton).to(toes), floor)
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
         held = held & (_onto_places(toes, held, ground).norm(dim=-1) < FARTHEST)
@@ -111,16 +112,6 @@ def lock(
 
 
 # -- where feet are to be ---------------------------------------------------------------------------
-
-
-def _slowest(toes: Tensor) -> Tensor:
-    """Way (..., frames, 2) to the frame before or after, whichever is less: in its first frame a
-    contact is at rest already."""
-    step = toes.diff(dim=-3).norm(dim=-1)
-    alone = step if toes.shape[-3] > 1 else toes.new_zeros(toes.shape[:-1])
-    return torch.minimum(
-        torch.cat([alone[..., :1, :], step], dim=-2), torch.cat([step, alone[..., -1:, :]], dim=-2)
-    )
 
 
 def _clean(contacts: Tensor, fps: float) -> Tensor:
@@ -248,7 +239,7 @@ def _bent(
     """Local rotations with legs that reach their ankles; feet keep the way they point."""
     rotations = rotations.clone()
     for i, side in enumerate(SIDES):
-        upper, lower, foot, toes = (joints[part][i] for part in _PARTS)
+        upper, lower, foot, toes = (joints[part][i] for part in PARTS)
         knee_was = points[..., lower, :] - points[..., upper, :]
         offsets = [
             below(skeleton, f"{side}_{a}", f"{side}_{b}").to(points)
@@ -256,8 +247,8 @@ def _bent(
         ]
         ahead = _knee_direction(points, world, upper, lower, foot)
         thigh, shank = two_bone(hips[..., i, :], ankle[..., i, :], ahead, *offsets)
-        knee = _turn(thigh, offsets[0])
-        shin = _turn(thigh @ shank, offsets[1])
+        knee = thigh @ offsets[0]
+        shin = thigh @ shank @ offsets[1]
         # the smallest turns of the bones as they were, so that no bone is twisted
         turned = {
             upper: shortest_turn(knee_was, knee) @ world[..., upper, :, :],
@@ -302,12 +293,9 @@ def _knee_direction(points: Tensor, world: Tensor, upper: int, lower: int, foot:
     return aside + (STRAIGHT - aside.norm(dim=-1, keepdim=True)).clamp(min=0) * front
 
 
-_PARTS = ("upper_leg", "lower_leg", "foot", "toes")
-
-
 def _legs(skeleton: Skeleton) -> dict[str, list[int]]:
     """Joints of both legs, left first: {part: [left, right]}; toes as `contacts.foot_points`."""
-    joints = {part: [skeleton.index(f"{s}_{part}") for s in SIDES] for part in _PARTS[:3]}
+    joints = {part: [skeleton.index(f"{s}_{part}") for s in SIDES] for part in PARTS[:3]}
     return joints | {"toes": [foot_points(skeleton)[1], foot_points(skeleton)[3]]}
 
 
@@ -317,10 +305,6 @@ def _forward(skeleton: Skeleton, root_positions: Tensor, rotations: Tensor):
         skeleton.parents, skeleton.offsets.to(rotations), root_positions, rotations,
         skeleton.end_parents, skeleton.end_offsets.to(rotations),
     )  # fmt: skip
-
-
-def _turn(orientations: Tensor, offset: Tensor) -> Tensor:
-    return (orientations @ offset[..., None])[..., 0]
 
 
 def _checked(contacts, root_positions: Tensor, floor, blend, fps) -> Tensor:
