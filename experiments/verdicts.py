@@ -237,7 +237,51 @@ def _fit_and_not_worse(outcomes: dict[str, str]) -> str:
     return PARTLY if set(outcomes.values()) & {BETTER, LEANING} else NOT
 
 
-# -- W4, W8, W10 ----------------------------------------------------------------------------------
+# -- W3, W4, W8, W10 ----------------------------------------------------------------------------------
+
+
+SKATE, JERK = "foot skate (cm/s)", "jerk (m/s³)"
+
+
+def w3(limits: dict, found: dict) -> Verdict:
+    numbers, near, told, moved = {}, {SKATE: [], JERK: []}, [], []
+    for gait, its in found["gaits"].items():
+        raw, refined = (its["variants"][name] for name in ("RNN", "GAN1"))
+        for key, so_far in near.items():
+            ratio = refined["distance from real over RNN's"][key]
+            numbers[f"{gait}, {key.split(' (')[0]}: distance from real over RNN's"] = ratio["value"]
+            so_far.append(ratio["value"] <= limits["left"])
+        before, after = (abs(one["critic"]["value"] - 0.5) for one in (raw, refined))
+        numbers[f"{gait}, critic's accuracy above one half, over RNN's"] = after / before
+        told.append(1 - after / before >= limits["critic"])
+        moved += [one["50%"] for one in refined["root moved (cm)"]]
+    numbers["roots moved, the worst refiner's median (cm)"] = max(moved)
+    good = [all(so_far) for so_far in near.values()]
+    verdict = REPRODUCED if all(good) and all(told) else PARTLY if any(good) else NOT
+    if verdict == REPRODUCED and max(moved) >= 5:
+        return Verdict(PARTLY, numbers, "roots are moved too far")
+    return Verdict(verdict, numbers)
+
+
+def w4(limits: dict, found: dict) -> Verdict:
+    numbers, nearer, critics, labels = {}, [], [], []
+    for gait, its in found["gaits"].items():
+        plain, contact = (its["variants"][name] for name in ("GAN1", "GAN2"))
+        gain = its["GAN2's distance from real minus GAN1's"][SKATE]
+        numbers[f"{gait}, foot skate: GAN2's distance from real minus GAN1's (cm/s)"] = gain[
+            "value"
+        ]
+        numbers[f"{gait}, the same, 95 % interval"] = f"{gain['low']:.3g} to {gain['high']:.3g}"
+        nearer.append(gain["high"] < 0)
+        pair = [one["critic"]["value"] for one in (plain, contact)]
+        numbers[f"{gait}, critic's accuracy, GAN1 and GAN2"] = f"{pair[0]:.3g}, {pair[1]:.3g}"
+        critics.append(pair[1] <= pair[0])
+        numbers[f"{gait}, F1 of labels"] = contact["labels"]["F1"]
+        labels.append(contact["labels"]["F1"] >= limits["f1"])
+    parts = [all(nearer), all(labels)]
+    if all(parts) and all(critics):
+        return Verdict(REPRODUCED, numbers)
+    return Verdict(PARTLY if any(parts) else NOT, numbers)
 
 
 def w4_generator(limits: dict, fit: dict, plain: dict, contact: dict) -> Verdict:
@@ -287,7 +331,7 @@ def w10(limits: dict, found: dict) -> Verdict:
 RULES = {
     "W1-variety": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
     "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
-    "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W4-generator": w4_generator,
+    "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W3": w3, "W4": w4, "W4-generator": w4_generator,
     "W8": w8, "W10": w10, **verdicts_aclstm.RULES,
 }  # fmt: skip
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
@@ -15,6 +15,7 @@ from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 from .commands.evaluate import Evaluate
 from .commands.reproduce import Reproduce
 from .commands.sample import Sample
+from .commands.train import Train
 from .errors import MotionLabError
 
 NO_FILES = "gaits are made on the spot and have no files."
@@ -173,74 +174,6 @@ class Prepare:
         prepared.save(out)
         print(f"{out}: {len(prepared.names)} clips, {len(prepared.features)} frames, "
               f"hash {prepared.hash[:12]}")  # fmt: skip
-
-
-@dataclass
-class Train:
-    """Train a model; started again, it goes on where it was stopped."""
-
-    model: Positional[str]
-    """lstm-gmm, lstm-gmm-contacts; or METHOD-STYLE, such as aclstm-indian: one of the methods aclstm,
-    lstm-3lr, scheduled, erd, seq2seq on one of the styles martial, indian, hybrid, walking."""
-    preset: Literal["smoke", "table", "ship", "paper"] = "table"
-    """How long and how large; see motionlab.training.presets."""
-    data: Annotated[str | None, arg(metavar="NAME|FOLDER|FILE")] = None
-    """Data set, folder of BVH files, or what `prepare` wrote; locomotion or the style if left out."""
-    start: Annotated[str | None, arg(name="from", metavar="NAME|WEIGHTS")] = None
-    """Weights to begin with, for fine-tuning."""
-    out: Path | None = None
-    """Folder to write to; runs/MODEL-PRESET if left out."""
-    updates: int | None = None
-    """Other number of updates than the preset's, also for a training under way."""
-    learning_rate: float | None = None
-    """Other learning rate than the preset's."""
-    seed: int | None = None
-    """Other seed than the preset's."""
-    accelerator: str = "auto"
-    """cpu, cuda, mps."""
-    devices: int = 1
-    """Processes, one a device."""
-    nodes: int = 1
-    """Machines."""
-
-    def run(self) -> None:
-        import torch
-
-        from .training import PRESETS, Prepared, build
-        from .weights import find
-
-        try:
-            from .training.finish import finish
-            from .training.loop import train
-        except ModuleNotFoundError as error:
-            raise MotionLabError(
-                f"Training needs {error.name}: pip install 'motionlab[train]'."
-            ) from error
-        chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
-        chosen = {key: value for key, value in chosen.items() if value is not None}
-        if self.model not in PRESETS:
-            raise MotionLabError(
-                f"There is no model {self.model!r} to train; there are {', '.join(PRESETS)}."
-            )
-        preset = replace(PRESETS[self.model][self.preset], **chosen)
-        style = "locomotion" if "lstm-gmm" in self.model else self.model.rpartition("-")[2]
-        data = Prepared.find(self.data or style)
-        if self.model == "lstm-gmm":
-            data = data.without_contacts()
-        start = find(self.start) if self.start else None
-        model = build(data, preset, start)
-        out = self.out or Path("runs") / f"{self.model}-{self.preset}"
-        curve = train(
-            model, data, preset, out, name=self.model, start=start,
-            accelerator=self.accelerator, devices=self.devices, nodes=self.nodes, progress=True,
-        )  # fmt: skip
-        if torch.distributed.is_initialized() and torch.distributed.get_rank():
-            return  # one process is enough for what is left
-        sampling = finish(out / preset.weights, data, preset)
-        best = min(curve, key=lambda point: point["val"])
-        print(f"{out}: {curve[-1]['update']} updates; best of validation {best['val']:.3f} at "
-              f"update {best['update']}; weights in {preset.weights}"
-              + "".join(f"; {key} {value:g}" for key, value in sampling.items()))  # fmt: skip
 
 
 COMMANDS = (

@@ -17,6 +17,7 @@ from motionlab.models.refiner import (
     effector_normalizer,
     fooling_loss,
     root_deviation,
+    steepness,
     telling_loss,
 )
 from motionlab.training.checkpoints import load_weights, save_weights
@@ -77,6 +78,74 @@ def test_pieces_give_what_the_whole_gives(world, cuts):
     assert all(torch.allclose(a, b, atol=1e-5) for a, b in zip(state, end, strict=True))
 
 
+@pytest.fixture
+def tethered(world):
+    """A refiner that may move the root by 4 cm, with weights that do so."""
+    encoding, _, refiner, _ = world
+    torch.manual_seed(1)
+    made = Refiner(encoding, refiner.normalizer, 16, refiner.effectors, reach=0.04)
+    for layer in (made.leave, made.aside):
+        torch.nn.init.normal_(layer.weight, std=0.5)
+    return made
+
+
+def test_a_refiner_can_see_slow_velocities_enlarged(world, tmp_path):
+    encoding, features, refiner, _ = world
+    torch.manual_seed(0)
+    close = Refiner(encoding, refiner.normalizer, 16, refiner.effectors, slow=0.1)
+    torch.nn.init.normal_(close.leave.weight, std=0.05)
+    before = _moving(encoding, features).unflatten(-1, (-1, 6))[..., :2, 3:].flatten(-2)
+    seen = torch.cat([refiner.normalizer(features), refiner.effectors(_moving(encoding, features)),
+                      torch.asinh(before / 0.1)], -1)  # fmt: skip
+    said = close.leave(close.lstm(close.enter(seen))[0])
+    expected = refiner.normalizer.inverse(refiner.normalizer(features) + said)
+    assert torch.allclose(close(features), expected, atol=1e-5)
+    save_weights(tmp_path / "close.safetensors", close, {})
+    assert load_weights(tmp_path / "close.safetensors")[0].slow == 0.1
+
+
+def test_a_tethered_root_is_where_it_is_said_to_be(world, tethered):
+    encoding, features, *_ = world
+    long = features.repeat(1, 10, 1)  # 400 frames, turning
+    refined = tethered(long)
+    felt, _ = tethered.lstm(tethered.enter(torch.cat(
+        [tethered.normalizer(long), tethered.effectors(_moving(encoding, long))], -1
+    )))  # fmt: skip
+    offset = 0.04 * tethered.aside(felt).tanh()  # aside, ahead
+    yaw = torch.cat([torch.zeros(3, 1), long[:, 1:, 2]], 1).cumsum(1)
+    aside = torch.stack(
+        [offset[..., 0] * yaw.cos() + offset[..., 1] * yaw.sin(),
+         offset[..., 1] * yaw.cos() - offset[..., 0] * yaw.sin()], -1
+    )  # fmt: skip
+    away = (encoding.root_path(refined) - encoding.root_path(long))[..., [0, 2]]
+    assert torch.allclose(away, aside - aside[:, :1], atol=1e-4)
+    assert away.abs().max() > 0.01
+    assert torch.equal(refined[..., 2], long[..., 2])  # turns are left alone
+    assert (refined[..., 3] - long[..., 3]).abs().max() > 1e-3  # heights are not
+
+
+def _moving(encoding, features):
+    with_before = torch.cat([features[:, :1], features], 1)
+    return encoding.end_effectors(with_before)[:, 1:].flatten(-2)
+
+
+def test_a_tethered_root_follows_a_stream(world, tethered):
+    _, features, *_ = world
+    whole, _ = tethered.refine(features)
+    first, state = tethered.refine(features[:, :13])
+    second, _ = tethered.refine(features[:, 13:], state)
+    assert torch.allclose(torch.cat([first, second], 1), whole, atol=1e-5)
+
+
+def test_a_tethered_refiner_begins_by_changing_nothing_and_is_kept(world, tethered, tmp_path):
+    encoding, features, refiner, _ = world
+    newborn = Refiner(encoding, refiner.normalizer, 8, refiner.effectors, reach=0.04)
+    assert torch.allclose(newborn(features), features, atol=1e-5)
+    save_weights(tmp_path / "refiner.safetensors", tethered, {})
+    again, _ = load_weights(tmp_path / "refiner.safetensors")
+    assert again.reach == 0.04 and torch.equal(again(features), tethered(features))
+
+
 def test_it_never_looks_ahead(world):
     _, features, refiner, _ = world
     changed = features.clone()
@@ -100,16 +169,20 @@ def test_the_discriminator_sees_end_effectors_alone(world):
         assert (critic(flipped) - critic(features)).abs().max() > 1e-4
 
 
-def test_slow_feet_can_be_enlarged(world):
+def test_slow_feet_and_sudden_changes_can_be_enlarged(world):
     encoding, features, _, critic = world
     close = Discriminator(encoding, critic.effectors, 12, slow=0.1)
-    velocities = encoding.end_effectors(features)[..., 3:].flatten(-2)
-    extra = torch.asinh(velocities / 0.1)
+    velocities = encoding.end_effectors(features)[..., 3:]
+    toes = torch.asinh(velocities[..., :2, :] / 0.1).flatten(-2)
+    changes = torch.asinh((velocities[:, 1:] - velocities[:, :-1]) / 0.1).flatten(-2)
     plain, seen = critic.seen(features), close.seen(features)
-    moving = len(critic.effectors.mean)
+    moving, end = len(critic.effectors.mean), len(critic.effectors.mean) + 6
+    assert encoding.effector_names[:2] == ("left_toes", "right_toes")
     assert torch.equal(seen[..., :moving], plain[..., :moving])
-    assert torch.allclose(seen[..., moving : moving + extra.shape[-1]], extra, atol=1e-6)
-    assert torch.equal(seen[..., moving + extra.shape[-1] :], plain[..., moving:])
+    assert torch.allclose(seen[..., moving:end], toes, atol=1e-6)
+    assert torch.allclose(seen[:, 1:, end : end + moving // 2], changes, atol=1e-5)
+    assert (seen[:, 0, end : end + moving // 2] == 0).all()  # nothing is known of before
+    assert torch.equal(seen[..., end + moving // 2 :], plain[..., moving:])
     assert close(features).shape == features.shape[:2]
 
 
@@ -128,6 +201,20 @@ def test_losses_are_those_of_the_paper():
     assert torch.allclose(telling_loss(real, refined), expected)
     undecided = torch.zeros(3)
     assert telling_loss(undecided, undecided).item() == pytest.approx(2 * math.log(2))
+
+
+def test_steepness_is_the_square_of_the_gradient():
+    """Of a plane it is the square of the slope, in the mean over directions."""
+
+    class Plane:
+        def judge(self, seen):
+            return seen @ torch.tensor([3.0, 0.0, -4.0])
+
+    chance = torch.Generator().manual_seed(0)
+    seen = torch.randn(50, 200, 3, generator=chance)
+    noise = 0.01 * torch.randn(seen.shape, generator=chance)
+    found = steepness(Plane(), seen, Plane().judge(seen), noise)
+    assert found.item() == pytest.approx(25, rel=0.05)
 
 
 def test_root_deviation_is_in_square_metres(world):
@@ -175,6 +262,11 @@ def test_what_cannot_be_refined_is_said(world):
             refiner.refine(*wrong)
     with pytest.raises(ModelError, match="JointAngles, not RootRelative"):
         Refiner(RootRelative(encoding.skeleton), refiner.normalizer)
+    for reach in (0.0, -1.0, math.nan):
+        with pytest.raises(ModelError, match="metres above 0"):
+            Refiner(encoding, refiner.normalizer, 8, reach=reach)
+        with pytest.raises(ModelError, match="metres a second above 0"):
+            Discriminator(encoding, slow=reach)
     with pytest.raises(ModelError, match="end effectors have 30"):
         Refiner(encoding, refiner.normalizer, 8, Normalizer(12))
 

@@ -9,8 +9,9 @@ import torch
 
 from motionlab.errors import DivergedError, TrainingError
 from motionlab.training import adversarial, build
-from motionlab.training.adversarial import GamePreset, new_game, play, sample_motions, train_game
+from motionlab.training.adversarial import new_game, play, sample_motions, train_game
 from motionlab.training.checkpoints import load_weights
+from motionlab.training.games import GamePreset
 from motionlab.training.windows import Windows
 
 SMALL = GamePreset(
@@ -142,10 +143,27 @@ def test_half_a_batch_of_the_history_is_exchanged_in_each_turn(gaits, generator)
 @pytest.mark.parametrize(
     "other",
     [{"warmup": 0}, {"turns": 1}, {"history": 0}, {"balance": False}, {"root_weight": 0.0},
-     {"instance_noise": 0.1}, {"spectral": True}, {"clip": 1.0}, {"slow": 0.1}],
+     {"instance_noise": 0.1}, {"spectral": True}, {"clip": 1.0}, {"slow": 0.1},
+     {"steepness_weight": 0.5}, {"piece": 4}, {"reach": 0.05}, {"change_weight": 1.0},
+     {"average": 0.9}],
 )  # fmt: skip
 def test_every_trick_can_be_left_out_and_every_remedy_taken(game, tmp_path, other):
     assert len(game(tmp_path, replace(SMALL, **other))) == 2
+
+
+def test_the_refiner_that_is_kept_can_be_an_average(gaits, generator, game, tmp_path):
+    averaged = replace(SMALL, average=0.5, validate_every=1)
+    game(tmp_path / "a", averaged)
+    game(tmp_path / "b", replace(averaged, average=0.0))
+    kept, plain = (
+        [load_weights(tmp_path / f / f"at-{n}.safetensors")[0].leave.weight for n in range(1, 5)]
+        for f in ("a", "b")
+    )
+    mean = torch.zeros_like(plain[0])
+    for step, now in enumerate(plain):
+        share = min(0.5, (step + 1) / (step + 10))
+        mean = share * mean + (1 - share) * now
+        assert torch.allclose(kept[step], mean, atol=1e-7)
 
 
 def test_a_heavier_root_weight_keeps_roots_nearer(game, tmp_path):
@@ -179,7 +197,8 @@ def test_exploded_motions_are_drawn_again(gaits, generator, monkeypatch):
 def test_what_cannot_be_played_is_said(game, tmp_path, gaits):
     for wrong, message in [
         ({"batch": 3}, "even"), ({"history": 2}, "a batch and more"), ({"turns": 0}, "turns"),
-        ({"refiner_rate": 0.0}, "refiner_rate"), ({"root_weight": float("nan")}, "root_weight"),
+        ({"refiner_rate": 0.0}, "refiner_rate"), ({"piece": 3}, "a divisor of frames"),
+        ({"root_weight": float("nan")}, "root_weight"),
     ]:  # fmt: skip
         with pytest.raises(TrainingError, match=message):
             replace(SMALL, **wrong)

@@ -9,7 +9,7 @@ import motionlab
 from motionlab import write_bvh
 from motionlab.__main__ import main
 from motionlab.datasets import gaits
-from motionlab.training import checkpoints
+from motionlab.training import checkpoints, judging
 
 
 @pytest.fixture
@@ -46,6 +46,33 @@ def test_train_prepares_trains_and_goes_on(here, capsys):
     assert 0.1 <= tuned.sampling["temperature"] <= 1
     assert main(["sample", "tuned/best.safetensors", "--seconds", "1", "--out", "a.bvh"]) == 0
     assert "from 'validation 1'" in capsys.readouterr().out
+
+
+def test_a_refiner_is_trained_judged_and_used(here, capsys, monkeypatch):
+    monkeypatch.setattr(judging, "UPDATES", 5)
+    assert main(["train", "lstm-gmm-contacts", *SMOKE, "--out", "g"]) == 0
+    play = ["train", "refiner-contacts", "--preset", "smoke", "--data", "gaits", "--accelerator",
+            "cpu", "--from", "g/best.safetensors", "--updates", "4"]  # fmt: skip
+    assert main([*play, "--out", "r"]) == 0
+    assert "the best is of step 4" in capsys.readouterr().out
+    assert main([*play, "--out", "r"]) == 0  # nothing left to do but to choose
+    sample = ["sample", "g/best.safetensors", "--seconds", "1", "--out"]
+    assert main([*sample, "raw.bvh"]) == 0
+    assert main([*sample, "refined.bvh", "--refiner", "r/best.safetensors", "--lock-feet"]) == 0
+    raw, refined = (motionlab.read_bvh(here / f"{n}.bvh") for n in ("raw", "refined"))
+    assert not raw.rotations.equal(refined.rotations)
+    capsys.readouterr()
+    for wrong, said in [
+        ([*sample, "a.bvh", "--refiner", "g/best.safetensors"], "is no refiner, but LstmGmm"),
+        ([*sample, "a.bvh", "--refiner", "none"], "no such file"),
+        (["sample", "lstm-gmm", "--seconds", "1", "--out", "a.bvh", "--refiner",
+          "r/best.safetensors"], "features of another kind"),
+        ([*play, "--learning-rate", "0.1"], "has two"),
+        (["train", "pfnn"], "refiner-contacts"),
+    ]:  # fmt: skip
+        assert main(wrong) == 1, wrong
+        assert said in capsys.readouterr().err
+    assert not (here / "a.bvh").exists()
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ from tyro.conf import Positional, arg
 from ..errors import MotionLabError, TrainingError
 
 if TYPE_CHECKING:
+    from torch import nn
+
     from ..motion import Motion
 
 LONG, MOST = 30_000, 1_000_000  # frames, of all characters: some ten seconds of work; of memory
@@ -41,6 +43,10 @@ class Sample:
     """Start of all chance."""
     characters: int = 1
     """How many, each with a chance of its own."""
+    refine: bool = False
+    """Let the shipped refiner correct it, so that feet slide less."""
+    refiner: Annotated[str | None, arg(metavar="NAME|WEIGHTS")] = None
+    """Let this one correct it: weights of your own."""
     lock_feet: Annotated[bool, arg(name="lock-feet")] = False
     """Hold toes still while they are in contact: as the network says, or else while they are slow."""
 
@@ -50,6 +56,7 @@ class Sample:
         from .. import load, write_bvh
 
         model = load(self.model)
+        refiner = self._refiner(model)
         paths, frames = self._paths(), self._frames(model.fps)
         chosen = self._starts(model.start_names)
         check_seed(self.seed)
@@ -66,6 +73,8 @@ class Sample:
                 frames, model.starts[chosen],
                 generator=torch.Generator().manual_seed(self.seed), **sampling,
             )  # fmt: skip
+            if refiner is not None:
+                features = refiner(features)
         motions = [
             model.encoding.to_motion(each, name=path.stem, source=self.model)
             for each, path in zip(features, paths, strict=True)
@@ -75,6 +84,25 @@ class Sample:
         for motion, path, start in zip(motions, paths, chosen, strict=True):
             write_bvh(motion, path)
             print(f"{path}: {motion.seconds:.1f} s from {model.start_names[start]!r}")
+
+    def _refiner(self, model: nn.Module) -> nn.Module | None:
+        """What corrects motion of a model, if that is wanted."""
+        from .. import load
+        from ..models import Refiner
+
+        if not self.refine and self.refiner is None:
+            return None
+        contacts = "contacts" in model.encoding.slices
+        name = self.refiner or ("refiner-contacts" if contacts else "refiner")
+        refiner = load(name)
+        if not isinstance(refiner, Refiner):
+            raise MotionLabError(f"--refiner {name}: is no refiner, but {type(refiner).__name__}.")
+        if refiner.encoding.config() != model.encoding.config():
+            raise MotionLabError(
+                f"{name} refines features of another kind than {self.model}'s: with contacts or "
+                "without, as angles or not, of another body or frame rate."
+            )
+        return refiner
 
     def _frames(self, fps: float) -> int:
         if not 0 < self.seconds < math.inf:

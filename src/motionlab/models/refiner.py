@@ -6,15 +6,20 @@ Motion Synthesis and Control*, section 4.2.
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
 from ..encodings import JointAngles, Normalizer
+from ..encodings.path import turned
 from ..errors import ModelError
 from .checks import checked_features, checked_state
 from .recurrent import Recurrent
 from .state import State
+
+_TOES = slice(0, 2)  # of the end effectors
 
 
 class Refiner(Recurrent):
@@ -32,13 +37,20 @@ class Refiner(Recurrent):
     width : of the hidden layers (the paper's is not known).
     effectors : Normalizer of what `end_effectors` gives, six numbers an end effector; from
         `effector_normalizer`. None: to be filled by `load_state_dict`.
+    reach : metres. If given, the network does not correct the root's steps and turns, where errors
+        add up without end. It says how far aside and ahead of its place the root should be, in its
+        heading, at most so far either way. Not the paper's.
+    slow : metres a second. If given, it sees the velocities v of toes as asinh(v / slow), too:
+        beside the metres a second of a step, the centimetres of a foot that slides are next to
+        nothing. Not the paper's.
 
     Raises
     ------
-    ModelError : the encoding is no `JointAngles`, or a normaliser is for something else.
+    ModelError : the encoding is no `JointAngles`, reach or slow is not above 0, or a normaliser is for something else.
     """
 
     layers = 1
+    settings = ("width", "reach", "slow")
 
     def __init__(
         self,
@@ -46,18 +58,25 @@ class Refiner(Recurrent):
         normalizer: Normalizer,
         width: int = 256,
         effectors: Normalizer | None = None,
+        reach: float | None = None,
+        slow: float | None = None,
     ) -> None:
         if not isinstance(encoding, JointAngles):
             raise ModelError(f"A refiner corrects JointAngles, not {type(encoding).__name__}.")
+        if reach is not None and not 0 < reach < math.inf:
+            raise ModelError(f"reach is {reach!r}; it must be metres above 0, or None.")
         super().__init__(encoding, normalizer, width)
-        self.effectors = _checked(encoding, effectors)
+        self.effectors, self.reach = _checked(encoding, effectors), reach
+        self.slow = _checked_slow(slow)
         self.enter = nn.Sequential(
-            nn.Linear(self.kept + len(self.effectors.mean), width), nn.ReLU()
+            nn.Linear(self.kept + _numbers(self.effectors, slow), width), nn.ReLU()
         )
         self.lstm = nn.LSTM(width, width, batch_first=True)
         self.leave = nn.Linear(width, self.kept)
-        for parameter in self.leave.parameters():  # at first it leaves every motion as it is
-            nn.init.zeros_(parameter)
+        self.aside = None if reach is None else nn.Linear(width, 2)
+        for layer in filter(None, (self.leave, self.aside)):
+            for parameter in layer.parameters():  # at first it leaves every motion as it is
+                nn.init.zeros_(parameter)
 
     def forward(self, features: Tensor) -> Tensor:
         """Refined features, as many as `features` (batch, frames, dim)."""
@@ -89,13 +108,30 @@ class Refiner(Recurrent):
         if len(state.frame) != len(features):
             raise ModelError(f"A state of {len(state.frame)} motions; there are {len(features)}.")
         with_before = torch.cat([state.frame[:, None], features], dim=1)
-        moving = self.encoding.end_effectors(with_before)[:, 1:].flatten(-2)
+        moving = _felt(self.encoding.end_effectors(with_before)[:, 1:], self.effectors, self.slow)
         normalized = self.normalizer(features)
-        seen = torch.cat([normalized, self.effectors(moving)], dim=-1)
+        seen = torch.cat([normalized, moving], dim=-1)
         memory = (part.transpose(0, 1).contiguous() for part in (state.hidden, state.cell))
         felt, (hidden, cell) = self.lstm(self.enter(seen), tuple(memory))
         refined = self.normalizer.inverse(normalized + self.leave(felt))
+        if self.reach is not None:
+            felt_before = torch.cat([state.hidden, felt[:, :-1]], dim=1)
+            steps = self._steps(features, self._offset(felt_before), self._offset(felt))
+            refined = torch.cat([steps, refined[..., 3:]], dim=-1)
         return refined, State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1))
+
+    def _offset(self, felt: Tensor) -> Tensor:
+        """Metres (..., 3) that the root should be aside and ahead of its place, in its heading."""
+        x, z = (self.reach * self.aside(felt).tanh()).unbind(-1)
+        return torch.stack([x, torch.zeros_like(x), z], dim=-1)
+
+    @staticmethod
+    def _steps(features: Tensor, before: Tensor, now: Tensor) -> Tensor:
+        """Steps and turns (..., 3) of a root that was, and is, so far from its place."""
+        x, _, z = (turned(now, features[..., 2]) - before).unbind(
+            -1
+        )  # in the frame before's heading
+        return features[..., :3] + torch.stack([x, z, torch.zeros_like(x)], dim=-1)
 
     def _seen(self, features: Tensor) -> State:
         return self.refine(features)[1]
@@ -112,9 +148,8 @@ class Discriminator(nn.Module):
     encoding : of the motions.
     effectors : as of `Refiner`.
     width : of the hidden layers, the LSTM's in each direction.
-    slow : metres a second. If given, it sees each velocity v as asinh(v / slow), too: beside a
-        hand's metres a second, the centimetres of a foot that slides are next to nothing. Not the
-        paper's.
+    slow : as of `Refiner`. It sees velocities' changes from frame to frame enlarged as well, those of
+        all end effectors: it would rather look at feet than at hands that tremble.
     """
 
     def __init__(
@@ -126,9 +161,9 @@ class Discriminator(nn.Module):
     ) -> None:
         super().__init__()
         self.encoding, self.effectors = encoding, _checked(encoding, effectors)
-        self.slow = slow
+        self.slow = _checked_slow(slow)
         contacts = encoding.slices.get("contacts", slice(0, 0))
-        seen = len(self.effectors.mean) + contacts.stop - contacts.start
+        seen = _numbers(self.effectors, slow) + contacts.stop - contacts.start
         seen += len(self.effectors.mean) // 2 if slow else 0
         self.enter = nn.Sequential(nn.Linear(seen, width), nn.ReLU())
         self.lstm = nn.LSTM(width, width, batch_first=True, bidirectional=True)
@@ -137,9 +172,10 @@ class Discriminator(nn.Module):
     def seen(self, features: Tensor) -> Tensor:
         """All that it sees of features (batch, frames, dim): (batch, frames, numbers)."""
         moving = self.encoding.end_effectors(features)
-        seen = [self.effectors(moving.flatten(-2))]
+        seen = [_felt(moving, self.effectors, self.slow)]
         if self.slow:
-            seen.append((moving[..., 3:] / self.slow).asinh().flatten(-2))
+            changes = moving[..., 3:].diff(dim=-3, prepend=moving[..., :1, :, 3:])
+            seen.append((changes / self.slow).asinh().flatten(-2))
         if "contacts" in self.encoding.slices:
             seen.append(self.encoding.contacts(features))
         return torch.cat(seen, dim=-1)
@@ -164,6 +200,26 @@ def fooling_loss(refined: Tensor) -> Tensor:
 def telling_loss(real: Tensor, refined: Tensor) -> Tensor:
     """-log D of real and -log(1 - D) of refined motion (eq. 10), each a mean over logits."""
     return softplus(-real).mean() + softplus(refined).mean()
+
+
+def steepness(critic: Discriminator, seen: Tensor, judged: Tensor, noise: Tensor) -> Tensor:
+    """How much logits change when what is seen does: mean square of the difference quotient.
+
+    A discriminator that may be as steep as it likes tells real from refined by hairs, and a refiner
+    learns nothing from it. This stands in for its gradient (the penalties R1 and R2 of Mescheder and
+    others, *Which training methods for GANs do actually converge?*, 2018), which torch can't
+    differentiate again through an LSTM on every device; as in Lin and others, *Diffusion adversarial
+    post-training for one-step video generation*, 2025.
+
+    Parameters
+    ----------
+    critic : the discriminator.
+    seen : (batch, frames, numbers), as `Discriminator.seen` gives it.
+    judged : (batch, frames), logits of that.
+    noise : like seen; small, of one deviation in every direction.
+    """
+    scale = noise.std()
+    return ((critic.judge(seen + noise) - judged) / scale).square().mean()
 
 
 def root_deviation(encoding: JointAngles, features: Tensor, refined: Tensor) -> Tensor:
@@ -193,3 +249,22 @@ def _checked(encoding: JointAngles, effectors: Normalizer | None) -> Normalizer:
             f"effectors have {size}."
         )
     return effectors
+
+
+def _felt(moving: Tensor, effectors: Normalizer, slow: float | None) -> Tensor:
+    """What a network sees of end effectors (..., effectors, 6): (..., numbers)."""
+    seen = effectors(moving.flatten(-2))
+    if slow is None:
+        return seen
+    return torch.cat([seen, (moving[..., _TOES, 3:] / slow).asinh().flatten(-2)], dim=-1)
+
+
+def _numbers(effectors: Normalizer, slow: float | None) -> int:
+    """How many numbers that is."""
+    return len(effectors.mean) + (0 if slow is None else 6)
+
+
+def _checked_slow(slow: float | None) -> float | None:
+    if slow is not None and not 0 < slow < math.inf:
+        raise ModelError(f"slow is {slow!r}; it must be metres a second above 0, or None.")
+    return slow

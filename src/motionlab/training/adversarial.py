@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Iterator
 from copy import deepcopy
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import count
 from pathlib import Path
 
@@ -26,88 +26,21 @@ from tqdm import tqdm
 
 from ..errors import DivergedError, TrainingError
 from ..models import Discriminator, Refiner
-from ..models.refiner import effector_normalizer, fooling_loss, root_deviation, telling_loss
+from ..models.refiner import (
+    effector_normalizer,
+    fooling_loss,
+    root_deviation,
+    steepness,
+    telling_loss,
+)
 from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
+from .games import GamePreset
 from .loop import CHECKPOINT
 from .prepared import Prepared
 from .windows import Windows
 
 OBSERVED = 2.0  # seconds of real motion that a sample of the generator goes on from
-
-
-@dataclass(frozen=True)
-class GamePreset:
-    """Settings of an adversarial training; as they stand, the paper's.
-
-    Each of its five tricks can be left out: `warmup` 0, `turns` 1, `history` 0, `balance` False,
-    `root_weight` 0.
-    """
-
-    steps: int
-    """Turns of the discriminator, after the warm-up."""
-    validate_every: int
-    """Steps from one checkpoint, and snapshot of the refiner, to the next."""
-    batch: int = 32
-    """b, windows in an update."""
-    frames: int = 50
-    """Frames in a window."""
-    warmup: int = 75
-    """Updates of each of the two in the first step."""
-    turns: int = 5
-    """The refiner's updates in every other step."""
-    history: int = 320
-    """B, refined windows of former refiners that are kept; half of what the discriminator sees."""
-    balance: bool = True
-    """Twice the refiner's turns while the discriminator is too strong, half if too weak."""
-    strong: float = 0.01
-    """Loss of a discriminator that is too strong."""
-    weak: float = 1.0
-    """Loss of one that is too weak."""
-    root_weight: float = 20.0
-    """Lambda, of the squared distance of refined from unrefined roots, in m² (eq. 13)."""
-    refiner_rate: float = 0.002
-    """Learning rate of the refiner."""
-    discriminator_rate: float = 0.005
-    """Learning rate of the discriminator."""
-    decay: float = 0.9
-    """Of RMSProp's mean of squared gradients."""
-    clip: float = 0.0
-    """Largest norm of a gradient; 0: none is shortened, as in the paper."""
-    instance_noise: float = 0.0
-    """Deviation of noise on all that the discriminator sees; a remedy, not the paper's."""
-    slow: float = 0.0
-    """Metres a second below which the discriminator sees velocities enlarged (see there); 0: not."""
-    spectral: bool = False
-    """Hold the discriminator's outer layers to a norm of 1; a remedy, not the paper's."""
-    width: int = 256
-    """Of the refiner's hidden layers."""
-    discriminator_width: int = 128
-    """Of the discriminator's, in each direction."""
-    samples: int = 64
-    """Motions of the generator at a time."""
-    seconds: float = 10.0
-    """Length of each of them."""
-    refresh: int = 100
-    """Steps after which they are made anew."""
-    seed: int = 0
-    """Start of all chance."""
-
-    def __post_init__(self) -> None:
-        least_one = ("steps", "validate_every", "frames", "turns", "width", "discriminator_width",
-                     "samples", "refresh")  # fmt: skip
-        wrong = [name for name in least_one if getattr(self, name) < 1]
-        wrong += [name for name in ("refiner_rate", "discriminator_rate", "seconds")
-                  if not 0 < getattr(self, name) < math.inf]  # fmt: skip
-        wrong += [name for name in ("warmup", "root_weight", "clip", "instance_noise", "slow")
-                  if not 0 <= getattr(self, name) < math.inf]  # fmt: skip
-        if self.batch < 2 or self.batch % 2:
-            wrong.append("batch (an even number)")
-        if self.history and self.history < self.batch:
-            wrong.append("history (0, or a batch and more)")
-        if not 0 <= self.decay < 1:
-            wrong.append("decay (from 0 to 1)")
-        if wrong:
-            raise TrainingError(f"These settings of a game make no sense: {', '.join(wrong)}.")
+HAIR = 0.1  # deviation of the noise by which the discriminator's steepness is felt
 
 
 class Game(nn.Module):
@@ -116,6 +49,7 @@ class Game(nn.Module):
     def __init__(self, refiner: Refiner, discriminator: Discriminator, preset: GamePreset) -> None:
         super().__init__()
         self.refiner, self.discriminator = refiner, discriminator
+        self.average = deepcopy(refiner).requires_grad_(False) if preset.average else None
         empty = torch.zeros(preset.history, preset.frames, refiner.encoding.dim)
         self.register_buffer("history", empty)
 
@@ -126,7 +60,10 @@ def new_game(data: Prepared, preset: GamePreset) -> Game:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(preset.seed)
         effectors = effector_normalizer(data.encoding, clips)
-        refiner = Refiner(data.encoding, data.normalizer, preset.width, effectors)
+        refiner = Refiner(
+            data.encoding, data.normalizer, preset.width, effectors, preset.reach or None,
+            preset.slow or None,
+        )  # fmt: skip
         critic = Discriminator(
             data.encoding, deepcopy(effectors), preset.discriminator_width, preset.slow or None
         )
@@ -194,6 +131,8 @@ def train_game(
         for step in range(facts["step"], preset.steps):
             for key, value in play(game, optimizer, source, preset, step):
                 seen[key].append(value)
+            if game.average is not None:
+                _follow(game, preset.average, step)
             bar.update()
             facts["step"] = step + 1
             if facts["step"] % preset.validate_every and facts["step"] != preset.steps:
@@ -243,9 +182,16 @@ def _tell(game, optimizer, source, preset, step, chance) -> float:
         places = torch.randperm(preset.history, generator=chance)[:half]
         refined = torch.cat([new, game.history[places]])
     real = source.real(preset.batch, chance)
-    judge = lambda windows: _judged(game.discriminator, windows, preset, chance)
-    loss = telling_loss(judge(real), judge(refined)) / 2
-    _descend(loss, game.discriminator, optimizer, preset, step)
+    seen = [_seen(game.discriminator, windows, preset, chance) for windows in (real, refined)]
+    judged = [game.discriminator.judge(some) for some in seen]
+    loss = telling_loss(*judged) / 2
+    steep = 0.0
+    if preset.steepness_weight:
+        for some, logits in zip(seen, judged, strict=True):
+            noise = HAIR * torch.randn(some.shape, generator=chance).to(some)
+            steep = steep + steepness(game.discriminator, some, logits, noise)
+    total = loss + preset.steepness_weight * steep
+    _descend(total, game.discriminator, optimizer, preset, step)
     if preset.history:
         game.history[torch.randperm(preset.history, generator=chance)[:half]] = new
     return loss.item()
@@ -255,17 +201,30 @@ def _fool(game, optimizer, source, preset, step, chance) -> tuple[float, float]:
     """The refiner learns once (eq. 13): the loss of eq. 9, and centimetres that roots are moved."""
     features = source.generated(preset.batch, step, chance)
     refined = game.refiner(features)
-    fooling = fooling_loss(_judged(game.discriminator, refined, preset, chance))
+    seen = _seen(game.discriminator, refined, preset, chance)
+    fooling = fooling_loss(game.discriminator.judge(seen))
     away = root_deviation(game.refiner.encoding, features, refined)
-    _descend(fooling + preset.root_weight * away, game.refiner, optimizer, preset, step)
+    normalizer = game.refiner.normalizer
+    changed = (normalizer(refined) - normalizer(features)).square().mean()
+    total = fooling + preset.root_weight * away + preset.change_weight * changed
+    _descend(total, game.refiner, optimizer, preset, step)
     return fooling.item(), 100 * away.item() ** 0.5
 
 
-def _judged(critic: Discriminator, windows: Tensor, preset: GamePreset, chance) -> Tensor:
+@torch.no_grad()
+def _follow(game: Game, share: float, step: int) -> None:
+    """The average takes a step towards the refiner; larger ones at first, for it began at nothing."""
+    share = min(share, (step + 1) / (step + 10))
+    for mean, now in zip(game.average.parameters(), game.refiner.parameters(), strict=True):
+        mean.lerp_(now, 1 - share)
+
+
+def _seen(critic: Discriminator, windows: Tensor, preset: GamePreset, chance) -> Tensor:
+    """What it is to judge (windows, frames, numbers), in pieces if it is to look no further."""
     seen = critic.seen(windows)
     if preset.instance_noise:
         seen = seen + preset.instance_noise * torch.randn(seen.shape, generator=chance).to(seen)
-    return critic.judge(seen)
+    return seen.unflatten(1, (-1, preset.piece)).flatten(0, 1) if preset.piece else seen
 
 
 def _descend(loss: Tensor, player: nn.Module, optimizer, preset: GamePreset, step: int) -> None:
@@ -340,7 +299,8 @@ def _resume(path: Path, game: Game, optimizer, facts: dict) -> None:
 
 
 def _keep(folder: Path, game: Game, optimizer, facts: dict) -> None:
-    save_weights(folder / f"at-{facts['step']}.safetensors", game.refiner, facts)
+    refiner = game.refiner if game.average is None else game.average
+    save_weights(folder / f"at-{facts['step']}.safetensors", refiner, facts)
     text = json.dumps(facts["curve"], indent=1).encode()
     try:
         write_whole(folder / "curve.json", lambda stream: stream.write(text))
