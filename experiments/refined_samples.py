@@ -208,7 +208,7 @@ def locked_rows(encoding, features: Tensor) -> list[dict]:
     for motion in features:
         decoded = encoding.to_motion(motion)
         locked = lock_feet(decoded, decoded.contacts, floor=None)
-        found.append(about_points(locked.positions, encoding.skeleton, encoding.fps))
+        found.append(about_points(locked.positions(), encoding.skeleton, encoding.fps))
     return found
 
 
@@ -328,10 +328,10 @@ def labels(encoding, motions: Sequence[Tensor]) -> dict[str, float]:
         for some in motions for motion in some
     ])[..., TOES]  # fmt: skip
     both = (said & true).sum()
-    precision, recall = float(both / said.sum()), float(both / true.sum())
     return {
-        "precision": precision, "recall": recall,
-        "F1": 2 * precision * recall / (precision + recall),
+        "precision": float(both / said.sum()),
+        "recall": float(both / true.sum()),
+        "F1": float(2 * both / (said.sum() + true.sum())),
         "stance by labels (s)": float(np.nanmean([stance(one, encoding.fps) for one in said])),
     }  # fmt: skip
 

@@ -328,11 +328,30 @@ def w10(limits: dict, found: dict) -> Verdict:
     return Verdict(PARTLY if model < data["BVH files"] else NOT, numbers)
 
 
+def w11(limits: dict, found: dict) -> Verdict:
+    its = found["classifier"]["test"]
+    one, each = (
+        its["effective styles of one"],
+        [start["effective styles"] for start in found["from a start of"].values()],
+    )
+    mean = sum(each) / len(each)
+    numbers = {
+        "classifier's accuracy on held-out clips": its["accuracy"],
+        "effective styles of clips of one style": one,
+        "effective styles from one state, mean": mean,
+        "the same, least and most": f"{min(each):.3g} to {max(each):.3g}",
+    }
+    if its["accuracy"] < limits["accuracy"]:
+        return Verdict(UNTESTABLE, numbers, "the classifier errs too often")
+    various = lambda value: value >= max(limits["styles"], limits["times"] * one)
+    return Verdict(REPRODUCED if various(mean) else PARTLY if various(max(each)) else NOT, numbers)
+
+
 RULES = {
     "W1-variety": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
     "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
     "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W3": w3, "W4": w4, "W4-generator": w4_generator,
-    "W8": w8, "W10": w10, **verdicts_aclstm.RULES,
+    "W8": w8, "W10": w10, "W11": w11, **verdicts_aclstm.RULES,
 }  # fmt: skip
 
 

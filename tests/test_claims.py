@@ -187,7 +187,18 @@ def refined(skate=0.4, jerk=0.4, critic=0.7, moved=1.0, gain=-1.0, f1=0.95, cont
     return {"gaits": gaits}
 
 
+def styles(accuracy=0.8, one=1.5, each=(2.5, 2.5)):
+    told = {"accuracy": accuracy, "effective styles of one": one}
+    starts = {str(i): {"effective styles": value} for i, value in enumerate(each)}
+    return {"classifier": {"test": told}, "from a start of": starts}
+
+
 CASES = [
+    ("W11", "reproduced", styles()),
+    ("W11", "partly", styles(each=(1.0, 2.5))),
+    ("W11", "partly", styles(one=2.0, each=(2.5, 3.0))),
+    ("W11", "not", styles(each=(1.9, 1.2))),
+    ("W11", "not testable here", styles(accuracy=0.59)),
     ("W3", "reproduced", refined(skate=0.5, jerk=0.5, critic=0.76)),
     ("W3", "partly", refined(critic=0.78)),
     ("W3", "partly", refined(jerk=0.6)),
