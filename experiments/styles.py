@@ -28,6 +28,13 @@ from motionlab.weights import find
 WINDOW, STEP = 2.0, 0.5  # seconds that are named at a time, and from one to the next
 ENOUGH = 10  # held-out clips of a style that is told
 BEFORE, UNTIL = 5.0, 10.0  # seconds of a sample after which it is named, and until which
+WAYS: dict[str, dict] = {  # the first is judged
+    "as it ships": {},
+    "temperature 1": {"sampling": {"temperature": 1.0}},
+    "a minute later": {"later": 60.0},
+    "pose alone, no memory": {"memory": False},
+}
+LEGS = ("Leg", "Foot", "Toes")
 DECAY, UPDATES, WIDTH = 1e-2, 400, 64  # of the classifier
 
 
@@ -59,11 +66,21 @@ def main(arguments: list[str] | None = None) -> None:
     told = {
         split: matrix(naming, [c for c in clips if c.split == split]) for split in ("val", "test")
     }
-    starts = {}
-    for style in styles:
-        first = start_of([c for c in clips if c.split == "test" and c.style == style], model.fps)
-        starts[style] = visited(model, naming, first, chosen.samples, chosen.seed)
-        print(style, starts[style], flush=True)
+    begun = {
+        style: start_of([c for c in clips if c.split == "test" and c.style == style], model.fps)
+        for style in styles
+    }
+    legs = Naming(data, clips, styles, chosen.seed, LEGS)
+    starts = {
+        way: {
+            style: visited(model, judge, first, chosen.samples, chosen.seed, **changes)
+            for style, first in begun.items()
+        }
+        for way, judge, changes in (
+            *((way, naming, changes) for way, changes in WAYS.items()),
+            ("named by the legs alone", legs, {}),
+        )
+    }
     result = {
         "weights": record.about_weights(model, path), "styles": styles,
         "training clips": dict(Counter(c.style for c in clips if c.split == "train")),
@@ -76,7 +93,12 @@ def main(arguments: list[str] | None = None) -> None:
             for split, found in told.items()
         },
         "samples": chosen.samples,
-        "from a start of": starts,
+        "from a start of": starts["as it ships"],
+        "how it moves": {
+            way: sum(its["effective styles"] for its in told.values()) / len(told)
+            for way, told in starts.items()
+        },
+        "ways": starts,
     }  # fmt: skip
     record.write(record.provenance(begin, chosen.seed, data) | result, chosen.output)
 
@@ -97,12 +119,21 @@ class Naming:
     """A network of one hidden layer that names the style of two seconds of body-frame features.
 
     It sees mean and deviation of each feature over the window, so neither the phase of a step nor
-    where the body is or faces.
+    where the body is or faces; only of features in whose names one of `parts` is.
     """
 
-    def __init__(self, data: Prepared, clips: Sequence[Clip], styles: list[str], seed: int) -> None:
+    def __init__(
+        self,
+        data: Prepared,
+        clips: Sequence[Clip],
+        styles: list[str],
+        seed: int,
+        parts: Sequence[str] = ("",),
+    ) -> None:
         self.encoding, self.styles = data.encoding, styles
         self.body = BodyFrame(self.encoding.skeleton, fps=self.encoding.fps, contacts=False)
+        names = self.body.feature_names
+        self.columns = [i for i, name in enumerate(names) if any(part in name for part in parts)]
         training = [(self.seen(c.features), c.style) for c in clips if c.split == "train"]
         self.normalizer = Normalizer.fit([seen for seen, _ in training])
         inputs = self.normalizer(torch.cat([seen for seen, _ in training]))
@@ -130,7 +161,7 @@ class Naming:
         """What the classifier sees of motion (frames, dim): (windows, numbers)."""
         body = self.body.encode(self.encoding.to_motion(features))
         fps = self.encoding.fps
-        windows = body.unfold(0, round(WINDOW * fps), round(STEP * fps))
+        windows = body[:, self.columns].unfold(0, round(WINDOW * fps), round(STEP * fps))
         return torch.cat([windows.mean(-1), windows.std(-1)], dim=-1)
 
     @torch.no_grad()
@@ -158,14 +189,30 @@ def start_of(clips: Sequence[Clip], fps: float) -> Tensor:
 
 
 @torch.no_grad()
-def visited(model: nn.Module, naming: Naming, begun: Tensor, count: int, seed: int) -> dict:
-    """What `count` samples from one state are named."""
-    state = model.observe(begun)[[0] * count]
+def visited(
+    model: nn.Module,
+    naming: Naming,
+    begun: Tensor,
+    count: int,
+    seed: int,
+    sampling: dict[str, float] | None = None,
+    later: float = 0.0,
+    memory: bool = True,
+) -> dict:
+    """What `count` samples from one state are named.
+
+    sampling : instead of what suits the weights.
+    later : seconds more that a sample goes on before it is named.
+    memory : False: the network knows the last frame alone.
+    """
+    state = model.observe(begun)
+    if not memory:
+        state = model.zero_state()._replace(frame=state.frame)
     made = model.generate(
-        round(UNTIL * model.fps), state,
-        generator=torch.Generator().manual_seed(seed), **model.sampling,
+        round((UNTIL + later) * model.fps), state[[0] * count],
+        generator=torch.Generator().manual_seed(seed), **(sampling or model.sampling),
     )  # fmt: skip
-    whole = made[made.isfinite().all(-1).all(-1)][:, round(BEFORE * model.fps) :]
+    whole = made[made.isfinite().all(-1).all(-1)][:, round((BEFORE + later) * model.fps) :]
     named = Counter(naming.name(motion) for motion in whole)
     row = [named[i] for i in range(len(naming.styles))]
     return {"named": row, "effective styles": effective(row)}
@@ -174,6 +221,8 @@ def visited(model: nn.Module, naming: Naming, begun: Tensor, count: int, seed: i
 def effective(row: Sequence[int]) -> float:
     """How many styles there are, were all as frequent: the exponential of the entropy."""
     shares = torch.tensor(row, dtype=torch.float64)
+    if not shares.sum():
+        return 0.0
     shares = shares[shares > 0] / shares.sum()
     return float((-(shares * shares.log()).sum()).exp())
 

@@ -37,6 +37,9 @@ def test_what_differs_is_named(script, clips):
     data = type("Data", (), {"encoding": encoding})
     naming = script.Naming(data, made, ["fast", "slow"], seed=0)
     assert script.matrix(naming, [c for c in made if c.split == "test"]) == [[3, 0], [0, 3]]
+    legs = script.Naming(data, made, ["fast", "slow"], 0, script.LEGS)
+    assert 0 < len(legs.columns) < len(naming.columns) == len(naming.body.feature_names)
+    assert script.matrix(legs, [c for c in made if c.split == "test"]) == [[3, 0], [0, 3]]
 
 
 def test_the_start_is_the_middle_walk(script, clips):

@@ -57,6 +57,15 @@ def test_a_critic_tells_feet_that_slide(gaits, quick):
     assert torch.equal(again.real, told.real)
 
 
+def test_a_critic_does_not_see_contact_channels(gaits, quick):
+    clips = gaits.clips("train")
+    blurred = [clip.clone() for clip in clips]
+    for clip in blurred:
+        clip[:, gaits.encoding.slices["contacts"]] = 0.5
+    told = critic(gaits.encoding, (clips[::2], blurred[::2]), (clips[1::2], blurred[1::2]))
+    assert told.accuracy == pytest.approx(0.5, abs=1e-6)
+
+
 def test_unrefined_motion_scores_one_for_each_of_four_distances(judge, generator):
     assert judge.score(judge.unrefined) == pytest.approx(4)
     found = judge(newborn(judge, generator))
