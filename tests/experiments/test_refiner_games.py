@@ -1,0 +1,51 @@
+"""The rows of the games: each changes what it says, and all have as many updates of the refiner."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+
+import pytest
+
+from motionlab.errors import DivergedError
+
+
+@pytest.fixture(scope="module")
+def script(experiment):
+    return experiment("refiner_games")
+
+
+def updates(preset):
+    """The refiner's, if the game stays in balance."""
+    return max(preset.warmup, preset.turns) + (preset.steps - 1) * preset.turns
+
+
+def test_all_games_are_equally_long(script):
+    for name, row in script.ROWS.items():
+        preset = row.preset(0)
+        assert updates(preset) == pytest.approx(script.OURS.steps, abs=5), name
+        assert preset.steps >= preset.validate_every
+
+
+def test_a_row_changes_what_it_says_and_nothing_else(script):
+    lengths = {"steps", "validate_every"}
+    for row in script.ROWS.values():
+        base, changed = asdict(row.base), asdict(row.preset(row.base.seed))
+        differ = {key for key in base if base[key] != changed[key]}
+        assert differ == {key for key in row.changes if base[key] != row.changes[key]}
+        assert len(differ - lengths) <= 2
+    paper = script.ROWS["paper"].preset(0)
+    assert (paper.warmup, paper.turns, paper.history, paper.root_weight) == (75, 5, 320, 20)
+
+
+def test_a_game_that_falls_apart_is_told(script, monkeypatch, tmp_path):
+    def fails(*_, **__):
+        raise DivergedError("gone")
+
+    monkeypatch.setattr(script, "train_game", fails)
+    monkeypatch.setattr(script, "FOLDER", tmp_path)
+    found = script.play(None, None, None, "paper", 0)
+    assert found["after"] is None and found["said"] == "gone"
+    script.told_in("paper", 0).write_text(json.dumps(found))  # its folder is there
+    assert math.isfinite(found["seed"])
