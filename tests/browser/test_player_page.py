@@ -145,6 +145,30 @@ def test_several_share_one_clock_side_by_side_and_overlaid(browser, page_file):
         assert 0 < right["x"] - left["x"] < 200
 
 
+def test_a_slider_chooses_which_motion_is_seen(browser, page_file):
+    motion = waving()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOTIONLAB_VIEWER", "page")
+        figure = show([motion, motion.mirror(), motion[:50]], labels=["0", "1/2", "1"],
+                      choose="blend", chosen=1, height=240)  # fmt: skip
+    file = page_file.with_name("choose.html")
+    file.write_text(PAGE.format(figure.html), encoding="utf-8")
+    with opened(browser, file) as page:
+        page.wait_for_selector(".ml-label")
+        slider = page.get_by_role("slider", name="blend")
+        assert page.locator(".ml-label").all_inner_texts() == ["1/2"]
+        assert slider.get_attribute("aria-valuetext") == "1/2"
+        page.evaluate("document.querySelector('figure').motionlab.setFrame(30)")
+        slider.focus()
+        page.keyboard.press("ArrowRight")
+        page.wait_for_function("document.querySelector('.ml-label').textContent === '1'")
+        assert page.locator(".ml-choose output").inner_text() == "1"
+        assert page.locator(".ml-overlay").is_hidden()
+        assert page.evaluate("document.querySelector('figure').motionlab.frame") >= 30
+        page.set_viewport_size({"width": 390, "height": 700})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
 def test_more_players_than_webgl_contexts_all_show(browser, page_file):
     with opened(browser, page_file, reduced_motion="reduce") as page:
         figures = page.locator("figure.motionlab-player")

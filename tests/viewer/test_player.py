@@ -289,6 +289,9 @@ POINTS = standing(5).positions()
         (((standing(),), {"trail": 99}), "26 points"),
         (((standing(),), {"height": 5}), "pixels"),
         ((([standing(2)] * 13,), {}), "13 motions"),
+        (((standing(2),), {"choose": "weight"}), "two motions or more"),
+        ((([standing(2)] * 3,), {"choose": "weight", "overlay": True}), "not overlaid"),
+        ((([standing(2)] * 3,), {"choose": "weight", "chosen": 3}), "chosen is 3"),
     ],
 )
 def test_bad_arguments_say_what_and_what_to_do(arguments, says):
@@ -321,6 +324,15 @@ def test_lists_labels_paths_and_trails_arrive():
     assert sent["tracks"][1]["contacts"] is None
     assert sent["trail"] == [CANONICAL.index("left_hand"), 0]
     assert [(p["track"], p["points"][0]) for p in sent["paths"]] == [(0, [0, 0]), (1, [1, 1])]
+    player.close()
+
+
+def test_one_of_several_can_be_chosen():
+    player = show([standing(2)] * 3, choose="weight", chosen=1, labels=["0", "1", "2"])
+    assert (player.payload["choose"], player.chosen) == ("weight", 1)
+    player.chosen = 9
+    assert player.chosen == 2
+    assert "choose" not in show([standing(2)] * 3).payload
     player.close()
 
 

@@ -51,9 +51,26 @@ export class Bar {
     this.reset = button("reset", "Reset view and time", () => player.reset());
     this.overlay.hidden = !several;
     this.element.append(this.play, this.slider, this.time, this.speed, this.follow, this.overlay, this.reset);
+    if (player.payload?.choose) this.element.append(this.chooser(player));
   }
 
-  show({ frame, playing, speed, follow, overlay }) {
+  /** A slider over motions of which one is seen at a time: another temperature, another weight. */
+  chooser(player) {
+    const names = player.tracks.map((track) => track.label);
+    this.names = names;
+    this.choice = document.createElement("input");
+    Object.assign(this.choice, { type: "range", min: 0, max: names.length - 1, step: 1, value: player.chosen, className: "ml-slider" });
+    this.choice.setAttribute("aria-label", player.payload.choose);
+    this.choice.addEventListener("input", () => player.set("chosen", this.choice.valueAsNumber));
+    this.name = document.createElement("output");
+    this.name.className = "ml-time";
+    const row = document.createElement("div");
+    row.className = "ml-choose";
+    row.append(Object.assign(document.createElement("span"), { textContent: player.payload.choose }), this.choice, this.name);
+    return row;
+  }
+
+  show({ frame, playing, speed, follow, overlay, chosen }) {
     if (this.playing !== playing) {
       this.playing = playing;
       this.play.innerHTML = icon(playing ? "pause" : "play");
@@ -71,5 +88,10 @@ export class Bar {
     this.speed.value = String(speed);
     this.follow.setAttribute("aria-pressed", String(follow));
     this.overlay.setAttribute("aria-pressed", String(overlay));
+    if (this.choice) {
+      this.choice.valueAsNumber = chosen;
+      this.choice.setAttribute("aria-valuetext", this.names[chosen]);
+      this.name.value = this.names[chosen];
+    }
   }
 }

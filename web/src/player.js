@@ -28,6 +28,7 @@ export class Player {
     this.clock.speed = payload.speed ?? 1;
     this.follow = payload.follow ?? true;
     this.overlay = payload.overlay ?? false;
+    this.chosen = payload.chosen ?? 0; // the track that is seen, if one is at a time
     this.visible = false;
     this.dirty = true;
     // At least as tall as a man standing, so that a crawling body looks as small as it is.
@@ -57,7 +58,7 @@ export class Player {
     this.labels.className = "ml-labels";
     this.labels.setAttribute("aria-hidden", "true");
     this.view.append(this.canvas, this.labels);
-    this.bar = new Bar(this, frames, fps, this.tracks.length > 1);
+    this.bar = new Bar(this, frames, fps, this.several);
     this.host.append(this.view, this.bar.element);
     this.orbit = new Orbit(this.canvas, !REDUCED?.matches);
     this.orbit.controls.addEventListener("change", () => { this.dirty = true; });
@@ -135,7 +136,10 @@ export class Player {
   pause() { this.set("playing", false); }
   toggle() { this.set("playing", !this.playing); }
 
-  /** Set playing, speed, follow or overlay. */
+  /** Whether the reader can have all motions in one picture. */
+  get several() { return this.tracks.length > 1 && !this.payload.choose; }
+
+  /** Set playing, speed, follow, overlay or chosen. */
   set(name, value) {
     const owner = name === "playing" || name === "speed" ? this.clock : this;
     if (owner[name] === value) return;
@@ -189,7 +193,7 @@ export class Player {
       Home: () => this.scrub(0),
       End: () => this.scrub(this.clock.frames - 1),
       f: () => this.set("follow", !this.follow),
-      o: () => this.tracks.length > 1 && this.set("overlay", !this.overlay),
+      o: () => this.several && this.set("overlay", !this.overlay),
       r: () => this.reset(),
       "+": () => this.orbit.turn(0, 0, 1 / 1.15),
       "-": () => this.orbit.turn(0, 0, 1.15),
@@ -205,8 +209,9 @@ export class Player {
 
   // -- picture ------------------------------------------------------------------------------------
 
-  /** Which tracks share a picture: each its own, or all together. */
+  /** Which tracks share a picture: each its own, all together, or the chosen one alone. */
   get cells() {
+    if (this.payload.choose) return [[this.chosen]];
     return this.overlay ? [this.tracks.map((_, i) => i)] : this.tracks.map((_, i) => [i]);
   }
 
@@ -216,7 +221,8 @@ export class Player {
     const arm = this.orbit.eye.position;
     this.azimuth = Math.atan2(dx, dz) + 0.9;
     const azimuth = keepAngle ? Math.atan2(arm.x, arm.z) : this.azimuth;
-    const room = Math.max(...this.cells.map((cell) => this.room(cell)));
+    const cells = this.payload.choose ? this.tracks.map((_, i) => [i]) : this.cells;
+    const room = Math.max(...cells.map((cell) => this.room(cell)));
     this.orbit.place(azimuth, 2.45 * this.tall + 1.7 * room, this.payload.floor + 0.5 * this.tall);
     this.dirty = true;
   }
@@ -251,8 +257,9 @@ export class Player {
     const { clientWidth: width, clientHeight: height } = this.view;
     if (!width || !height) return;
     this.dirty = false;
-    for (const track of this.tracks) track.seek(this.clock.time);
-    for (const actor of this.casts.flat()) actor.update();
+    const seen = this.cells.flat();
+    for (const i of seen) this.tracks[i].seek(this.clock.time);
+    for (const actor of seen.flatMap((i) => this.casts[i])) actor.update();
     const ratio = this.playing ? this.coarse : this.fine;
     const size = [Math.round(width * ratio), Math.round(height * ratio)];
     if (this.canvas.width !== size[0] || this.canvas.height !== size[1]) [this.canvas.width, this.canvas.height] = size;
@@ -274,7 +281,7 @@ export class Player {
   }
 
   label(views, cells) {
-    const layout = JSON.stringify([views.map(({ x, y, width, height }) => [x, y, width, height]), this.overlay]);
+    const layout = JSON.stringify([views.map(({ x, y, width, height }) => [x, y, width, height]), cells]);
     if (layout === this.labelled) return;
     this.labelled = layout;
     this.labels.replaceChildren(

@@ -1,7 +1,7 @@
 // Entry of the Jupyter widget: ties the player to the traits of motionlab.viewer.Player.
 import { Player } from "./player.js";
 
-const SHARED = ["playing", "speed", "follow", "overlay"];
+const SHARED = ["playing", "speed", "follow", "overlay", "chosen"];
 const SAVE_EVERY = 200; // milliseconds: while it plays the kernel hears of the frame five times a second
 
 function render({ model, el }) {

@@ -75,7 +75,8 @@ def payload(
     fps : frames per second of all of them.
     paths : ``{"points": [[x, z], ...], "color": "#...", "track": index or None}``, metres.
     trail : points that leave a trail.
-    options : height, follow, overlay, autoplay, speed.
+    options : height, follow, overlay, autoplay, speed; choose, the name of a slider over the tracks,
+        of which one is seen at a time, and chosen, which is at first.
 
     Every ``stride``-th frame is stored, so that at least `SHOWN_FPS` a second are; ``frames`` and
     the player's clock count the motion's own frames.
@@ -224,11 +225,13 @@ class Player(anywidget.AnyWidget):
     speed = traitlets.Float(1.0, min=0.0).tag(sync=True)
     follow = traitlets.Bool(True).tag(sync=True)
     overlay = traitlets.Bool(False).tag(sync=True)
+    chosen = traitlets.Int(0).tag(sync=True)
     caption = traitlets.Unicode("").tag(sync=True)
 
     def __init__(self, payload: dict[str, Any], **traits: Any):
         _built("widget.js")
-        state = {name: payload[name] for name in ("speed", "follow", "overlay") if name in payload}
+        shared = ("speed", "follow", "overlay", "chosen")
+        state = {name: payload[name] for name in shared if name in payload}
         playing = bool(payload.get("autoplay", False))
         super().__init__(payload=payload, **{"playing": playing, **state, **traits})
 
@@ -242,6 +245,10 @@ class Player(anywidget.AnyWidget):
     @traitlets.validate("frame")
     def _inside(self, proposal: dict[str, Any]) -> int:
         return min(max(proposal["value"], 0), self.payload["frames"] - 1)
+
+    @traitlets.validate("chosen")
+    def _one_of_them(self, proposal: dict[str, Any]) -> int:
+        return min(max(proposal["value"], 0), len(self.payload["tracks"]) - 1)
 
 
 def page_html(payload: dict[str, Any], still: str | None = None, caption: str | None = None) -> str:

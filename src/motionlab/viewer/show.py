@@ -40,6 +40,8 @@ def show(
     paths: Any = None,
     trail: str | int | Sequence[str | int] | None = None,
     overlay: bool = False,
+    choose: str | None = None,
+    chosen: int = 0,
     caption: str | None = None,
     height: int = 380,
     skeleton: Skeleton | None = None,
@@ -58,6 +60,9 @@ def show(
     paths : a path (n, 2) of x, z or (n, 3) of points in metres, or a list of paths, on the ground.
     trail : joints (names, roles or point indices) that leave a trail.
     overlay : all in one picture instead of side by side; the player has a button for it, too.
+    choose : name of a slider by which one motion is seen at a time, such as "weight"; its values are
+        the labels.
+    chosen : number of the motion that is seen at first, then.
     caption : a text below the player.
     height : of the picture, pixels.
     skeleton, fps : of point positions; needed for those only.
@@ -66,8 +71,8 @@ def show(
 
     Returns
     -------
-    A widget whose ``frame``, ``playing``, ``speed``, ``follow`` and ``overlay`` can be set, read and
-    linked. With the environment variable ``MOTIONLAB_VIEWER=page`` (a book build) plain HTML.
+    A widget whose ``frame``, ``playing``, ``speed``, ``follow``, ``overlay`` and ``chosen`` can be
+    set, read and linked. With the environment variable ``MOTIONLAB_VIEWER=page`` (a book build) plain HTML.
     """
     motions = _as_list(motion)
     names = _per_motion("labels", labels, len(motions))
@@ -80,6 +85,12 @@ def show(
     rate = _rate(motions, fps)
     if not isinstance(height, int | np.integer) or not 120 <= height <= 2000:
         raise ViewerError(f"show: height is {height!r}; give pixels, from 120 to 2000.")
+    if choose is not None:
+        if overlay or len(tracks) < 2 or not 0 <= chosen < len(tracks):
+            raise ViewerError(
+                f"show: choose={choose!r} is a slider over two motions or more, not overlaid, and "
+                f"chosen one of their numbers; there are {len(tracks)}, chosen is {chosen}."
+            )
     data = payload(
         tracks,
         rate,
@@ -89,6 +100,7 @@ def show(
         overlay=bool(overlay),
         follow=True,
         autoplay=bool(autoplay),
+        **({} if choose is None else {"choose": str(choose), "chosen": int(chosen)}),
     )
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
         return PagePlayer(page_html(data, still_picture(tracks[0]), caption))
