@@ -2,8 +2,7 @@
 
     python benchmarks/bench_foot_lock.py [--clips 32] [--rounds 5] [--threads 1] [--save]
 
-The motion is the shipped network's with contacts, so feet slide. Also the refiner, untrained, at
-its shipped width: frames a second of one character, as a stream of single frames and in one piece.
+The motion is the shipped network's with contacts, so feet slide.
 """
 
 from __future__ import annotations
@@ -15,11 +14,10 @@ import tyro
 from interleaved import medians, save, table, verdict
 
 import motionlab
-from motionlab.models import Refiner
 from motionlab.solvers.foot_lock import lock
 
 SECONDS = 10
-LIMITS = {"one clip (s)": 2.0, "batch / loop": 1 / 5, "refined / played": 1 / 30}
+LIMITS = {"one clip (s)": 2.0, "batch / loop": 1 / 5}
 
 
 @dataclass
@@ -42,28 +40,18 @@ def main(options: Options) -> None:
     )
     place, turns = encoding.rotations(features)
     down = encoding.contacts(features) > 0.5
-    refiner = Refiner(encoding, model.normalizer).eval()
-
-    def stream() -> None:
-        state = None
-        for frame in features[:1].split(1, dim=1):
-            _, state = refiner.refine(frame, state)
-
     locked = lambda i: lock(encoding.skeleton, place[i], turns[i], down[i], fps)
     seconds = medians(
         {
             "one": lambda: locked(0),
             "loop": lambda: [locked(i) for i in range(options.clips)],
             "batch": lambda: lock(encoding.skeleton, place, turns, down, fps),
-            "refined frame by frame": stream,
-            "refined at once": lambda: refiner.refine(features[:1]),
         },
         options.rounds,
     )
     found = {
         "one clip (s)": seconds["one"],
         "batch / loop": seconds["batch"] / seconds["loop"],
-        "refined / played": seconds["refined frame by frame"] / SECONDS,
     }
     table(
         f"{options.clips} clips of {SECONDS} s, {options.threads} threads",

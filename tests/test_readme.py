@@ -72,7 +72,9 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     from motionlab.datasets import gaits
 
     commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", README, re.MULTILINE)
-    sample, still, dance, prepare, train, tune, again, dancer = map(str.split, commands)
+    sample, still, dance, prepare, train, tune, again, dancer, game, mended = map(
+        str.split, commands
+    )
     # these need data, and minutes or hours
     assert (prepare, train[0], dancer[0]) == (["prepare", "locomotion"], "train", "train")
     monkeypatch.chdir(tmp_path)
@@ -88,6 +90,9 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     assert main([*tune, "--updates", "1", "--accelerator", "cpu"]) == 0
     assert main(again) == 0
     assert read_bvh("mine.bvh").seconds == 10
+    assert main([*game, "--preset", "smoke", "--updates", "1", "--accelerator", "cpu"]) == 0
+    assert main(mended) == 0
+    assert read_bvh("refined.bvh").seconds == 10
 
 
 def test_what_the_readme_links_to_is_there():

@@ -67,6 +67,11 @@ def test_a_refiner_is_trained_judged_and_used(here, capsys, monkeypatch):
         ([*sample, "a.bvh", "--refiner", "none"], "no such file"),
         (["sample", "lstm-gmm", "--seconds", "1", "--out", "a.bvh", "--refiner",
           "r/best.safetensors"], "features of another kind"),
+        (["sample", "r/best.safetensors", "--out", "a.bvh"], "corrects motion and makes none"),
+        (["evaluate", "r/best.safetensors"], "corrects motion and makes none"),
+        ([*play[:-3], "r/best.safetensors"], "corrects motion and makes none"),
+        (["train", "lstm-gmm-contacts", *SMOKE, "--from", "r/best.safetensors", "--out", "b"],
+         "is a refiner"),
         ([*play, "--learning-rate", "0.1"], "has two"),
         (["train", "pfnn"], "refiner-contacts"),
     ]:  # fmt: skip

@@ -104,6 +104,8 @@ def test_nothing_to_choose_is_said(judge, generator, tmp_path, monkeypatch, gait
     monkeypatch.setattr(Judge, "__call__", lambda *_: {"score": math.inf})
     with pytest.raises(TrainingError, match="heavier root_weight"):
         choose(tmp_path, judge)
+    with pytest.raises(TrainingError, match="another kind"):
+        Judge(generator, gaits.without_contacts())
     short = [clip[:10] for clip in gaits.clips("train")]
     with pytest.raises(TrainingError, match="looks at 30 frames"):
         critic(gaits.encoding, (short, short), (short, short))

@@ -10,7 +10,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 import motionlab
-from motionlab import weights
+from motionlab import contacts, metrics, weights
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import LstmGmm
 from motionlab.training.checkpoints import load_weights, save_weights
@@ -217,7 +217,30 @@ def test_starts_are_named_after_what_follows(ship_weights, gaits):
         assert start.gait == gait or (gait == "go" and start.gait in ("walk", "stand")), start
 
 
-@pytest.mark.parametrize("name", weights.names())
+REFINERS = [name for name in weights.names() if name.startswith("refiner")]
+
+
+@pytest.mark.parametrize("name", REFINERS)
+def test_shipped_refiners_mend_feet_and_leave_paths(name):
+    refiner, model = motionlab.load(name), motionlab.load(name.replace("refiner", "lstm-gmm"))
+    assert refiner.about["name"] == name and refiner.card.startswith(f"# {name}\n")
+    assert refiner.about["generator_hash"] == model.hash, "of other weights than ship"
+    moving = [i for i, start in enumerate(model.start_names) if start.startswith(("walk", "run"))]
+    chance = torch.Generator().manual_seed(0)
+    made = model.generate(300, model.starts[moving], generator=chance, **model.sampling)
+    refined, skates = refiner(made), []
+    for some in (made, refined):
+        points = [model.encoding.positions(motion) for motion in some]
+        skates.append(torch.stack([
+            metrics.foot_skate(p, contacts.label_positions(p, model.encoding.skeleton, 30),
+                               model.encoding.skeleton, 30) for p in points
+        ]).nanmean())  # fmt: skip
+    assert skates[1] < 0.6 * skates[0]
+    away = model.encoding.root_path(refined) - model.encoding.root_path(made)
+    assert away[..., [0, 2]].norm(dim=-1).max() <= 2 * 2**0.5 * refiner.reach + 1e-4
+
+
+@pytest.mark.parametrize("name", [name for name in weights.names() if name not in REFINERS])
 def test_what_is_shipped(name):
     model = motionlab.load(name)
     assert weights.find(name).stat().st_size < 10 * 2**20

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from ..errors import TrainingError
-from .sample import check_seed, check_writable, given
+from .sample import check_generates, check_seed, check_writable, given
 
 
 @dataclass
@@ -51,7 +51,9 @@ class Evaluate:
         check_seed(self.seed)
         if self.out is not None:
             check_writable(self.out)
-        model, data = load(self.model), Prepared.find(self.data)
+        model = load(self.model)
+        check_generates(model, self.model)
+        data = Prepared.find(self.data)
         sampling = model.sampling | given(self)
         found = evaluate(
             model, data, self.split, starts=self.starts, seconds=self.seconds, seed=self.seed,

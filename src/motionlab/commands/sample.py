@@ -56,6 +56,7 @@ class Sample:
         from .. import load, write_bvh
 
         model = load(self.model)
+        check_generates(model, self.model)
         refiner = self._refiner(model)
         paths, frames = self._paths(), self._frames(model.fps)
         chosen = self._starts(model.start_names)
@@ -150,6 +151,15 @@ def locked(motion: Motion) -> Motion:
 
     found = label(motion) if motion.contacts is None else motion.contacts
     return lock_feet(motion, found, floor=None)
+
+
+def check_generates(model: nn.Module, name: str) -> None:
+    """Raise MotionLabError for weights that make no motion of their own."""
+    if not hasattr(model, "generate"):
+        raise MotionLabError(
+            f"{name}: is a {type(model).__name__.lower()}, which corrects motion and makes none; name "
+            f"a generator, and it as `motionlab sample lstm-gmm --refiner {name}`."
+        )
 
 
 def given(command: object) -> dict[str, float]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError
+from .sample import check_generates
 
 if TYPE_CHECKING:
     from ..training import Preset
@@ -104,13 +105,15 @@ class Train:
         chosen = {"steps": self.updates, "seed": self.seed}
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
         generator = load(self.start or self.model.replace("refiner", "lstm-gmm"))
+        check_generates(generator, self.start or self.model)
         data = Prepared.find(self.data or "locomotion")
         if "contacts" not in generator.encoding.slices:
             data = data.without_contacts()
+        judge = Judge(generator, data)  # says now what it would have to say after the game
         device = None if self.accelerator == "auto" else self.accelerator
         train_game(generator, data, preset, out, name=self.model, device=device, progress=True)
         print("which refiner is best? this takes some seconds for each", flush=True)
-        best = choose(out, Judge(generator, data), preset.weights)
+        best = choose(out, judge, preset.weights)
         print(f"{out}: the best is of step {best['step']}; weights in {preset.weights}; foot skate "
               f"{best['foot skate (cm/s)']:.1f} cm/s, jerk {best['jerk (m/s³)']:.0f} m/s³, a "
               f"critic is right in {best['critic']:.0%}, roots moved {100 * best['root (m)']:.1f} cm")  # fmt: skip

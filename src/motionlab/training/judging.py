@@ -123,6 +123,10 @@ class Judge:
     split : whose clips of two seconds and more are used.
     seconds : length of a sample.
     seed : of the samples' chance.
+
+    Raises
+    ------
+    TrainingError : data of another encoding than the generator's, or fewer than four such clips.
     """
 
     def __init__(
@@ -133,6 +137,8 @@ class Judge:
         seconds: float = 10.0,
         seed: int = 0,
     ) -> None:
+        if generator.encoding.config() != data.encoding.config():
+            raise TrainingError("The generator makes features of another kind than the data's.")
         seen = round(OBSERVED * generator.fps)
         clips = [clip for clip in data.clips(split) if len(clip) >= seen]
         if len(clips) < 4:

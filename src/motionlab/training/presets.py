@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from ..errors import TrainingError
-from ..models import LstmGmm
+from ..models import LstmGmm, Refiner
 from .checkpoints import load_weights
 from .prepared import Prepared
 from .windows import Windows
@@ -155,13 +155,15 @@ def build(data: Prepared, preset: Preset, start: Path | None = None) -> nn.Modul
 
     Raises
     ------
-    TrainingError : the weights are for another encoding than the data's.
+    TrainingError : the weights are for another encoding than the data's, or a refiner's.
     """
     if start is None:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(preset.seed)
             return preset.model(data)
     model, _ = load_weights(start)
+    if isinstance(model, Refiner):
+        raise TrainingError(f"{start}: is a refiner, which is trained by a game, not to predict.")
     if model.encoding.config() != data.encoding.config():
         raise TrainingError(
             f"{start}: these weights are for features of another kind than the data."
