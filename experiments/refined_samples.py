@@ -176,7 +176,7 @@ def about_points(points: Tensor, skeleton, fps: float) -> dict[str, float]:
     return measured(points, skeleton, fps) | {
         "turn rate (rad/s)": float(metrics.turn_rate(points, skeleton, fps).mean()),
         "step length (m)": float(metrics.step_length(points, down, skeleton, fps)),
-        "in the floor (cm)": float(metrics.penetration(points, skeleton)),
+        "in the floor (cm)": float(metrics.penetration(points, skeleton).mean()),
         "straightest knee (°)": float(bends.min()),
         "knees' speed (°/s)": float(bends.diff(dim=-1).abs().mean() * fps),
         "stance (s)": stance(down[:, TOES], fps),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import aclstm_cases
 import pytest
+import refiner_cases
 import yaml
 
 from motionlab import MotionLabError
@@ -165,51 +166,7 @@ def sizes(*data):
 STEADY, LIVELY = (50, 51, 52), (1.2, 1.2, 1.2)
 
 
-def refined(skate=0.4, jerk=0.4, critic=0.7, moved=1.0, gain=-1.0, f1=0.95, contact_critic=0.7):
-    """Both gaits alike, but for running's foot skate if there are two."""
-    skates = skate if isinstance(skate, tuple) else (skate, skate)
-    gaits = {}
-    for gait, its in zip(("walk", "run"), skates, strict=True):
-        near = {"foot skate (cm/s)": {"value": its}, "jerk (m/s³)": {"value": jerk}}
-        gaits[gait] = {
-            "variants": {
-                "RNN": {"critic": {"value": 0.9}},
-                "GAN1": {
-                    "critic": {"value": critic}, "distance from real over RNN's": near,
-                    "root moved (cm)": [{"50%": 0.5}, {"50%": moved}],
-                },
-                "GAN2": {"critic": {"value": contact_critic}, "labels": {"F1": f1}},
-            },
-            "GAN2's distance from real minus GAN1's": {
-                "foot skate (cm/s)": {"value": gain, "low": gain - 0.5, "high": gain + 0.5}
-            },
-        }  # fmt: skip
-    return {"gaits": gaits}
-
-
-def styles(accuracy=0.8, one=1.5, each=(2.5, 2.5)):
-    told = {"accuracy": accuracy, "effective styles of one": one}
-    starts = {str(i): {"effective styles": value} for i, value in enumerate(each)}
-    return {"classifier": {"test": told}, "from a start of": starts}
-
-
 CASES = [
-    ("W11", "reproduced", styles()),
-    ("W11", "partly", styles(each=(1.0, 2.5))),
-    ("W11", "partly", styles(one=2.0, each=(2.5, 3.0))),
-    ("W11", "not", styles(each=(1.9, 1.2))),
-    ("W11", "not testable here", styles(accuracy=0.59)),
-    ("W3", "reproduced", refined(skate=0.5, jerk=0.5, critic=0.76)),
-    ("W3", "partly", refined(critic=0.78)),
-    ("W3", "partly", refined(jerk=0.6)),
-    ("W3", "partly", refined(skate=(0.4, 0.6))),
-    ("W3", "partly", refined(moved=6.0)),
-    ("W3", "not", refined(skate=(0.4, 0.6), jerk=0.6)),
-    ("W4", "reproduced", refined()),
-    ("W4", "partly", refined(f1=0.8)),
-    ("W4", "partly", refined(gain=0.1)),
-    ("W4", "partly", refined(contact_critic=0.71)),
-    ("W4", "not", refined(gain=-0.4, f1=0.8)),
     ("W1-variety", "reproduced", variety([1.0] * 6)),
     ("W1-variety", "partly", variety([2.0] * 6, sound=0.8)),
     ("W1-variety", "partly", variety([1.2] * 3 + [0.9] * 3)),
@@ -257,6 +214,7 @@ CASES = [
     ("W10", "partly", sizes(300, 30, 9)),
     ("W10", "not", sizes(9, 9, 9)),
     *aclstm_cases.CASES,
+    *refiner_cases.CASES,
 ]  # fmt: skip
 
 
