@@ -17,7 +17,7 @@ from interleaved import medians, save, table, verdict
 import motionlab
 
 SECONDS, FRAMES = 10, 60
-LIMITS = {"a stream / its length": 1 / 30, "refining / generating many": 2.0}
+LIMITS = {"refining / generating many": 2.0}
 
 
 @dataclass

@@ -1,5 +1,6 @@
 """The fast sampler against the loop that can be read, and its rounded weights against whole ones."""
 
+import copy
 import math
 from types import SimpleNamespace
 
@@ -112,6 +113,17 @@ def test_inference_mode_autocast_and_one_frame(model, start):
             found = model.generate(30, start, generator=chance())
         assert torch.equal(found, expected)
         assert model.generate(1, start).shape == (4, 1, model.encoding.dim)
+
+
+@pytest.mark.parametrize("precision", [pytest.param("half", marks=rounds)])
+def test_weights_made_in_inference_mode_are_rounded_too(model, start, precision):
+    expected = copy.deepcopy(model)
+    with torch.inference_mode():
+        made = copy.deepcopy(model)
+        draw = lambda net: net.generate(5, start, generator=chance(), precision=precision)
+        assert torch.equal(draw(made), draw(expected))
+        made.lstm.weight_hh_l1.mul_(-1)
+        assert not torch.allclose(draw(made), draw(expected))
 
 
 @pytest.mark.parametrize("precision", ["full", pytest.param("half", marks=rounds)])

@@ -109,6 +109,8 @@ def _products(model: LstmGmm, precision: str) -> list[Linear]:
     """
     if precision == "full":
         return _made(model, _full)
+    if any(weight.is_inference() for weight in model.parameters()):
+        return _made(model, PRECISIONS[precision])  # made in inference mode: changes leave no trace
     weights = [precision, *((weight.data_ptr(), weight._version) for weight in model.parameters())]
     of_weights, products = _rounded.get(model, (None, []))
     if of_weights != weights:
