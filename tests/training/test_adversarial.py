@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import pytest
@@ -83,6 +84,15 @@ def test_a_game_can_be_prolonged_but_not_changed(game, tmp_path):
     assert game(tmp_path, replace(SMALL, steps=6))[-1]["step"] == 6
     with pytest.raises(TrainingError, match=r"other root_weight; repeat its settings"):
         game(tmp_path, replace(SMALL, root_weight=1.0))
+
+
+def test_a_game_is_with_one_generator(game, generator, tmp_path):
+    first, second = copy.copy(generator), copy.copy(generator)
+    first.hash, second.hash = "a" * 64, "b" * 64
+    game(tmp_path, generator=first)
+    assert game(tmp_path, replace(SMALL, steps=5), generator=first)[-1]["step"] == 5
+    with pytest.raises(TrainingError, match="other generator"):
+        game(tmp_path, generator=second)
 
 
 class Counted:

@@ -46,7 +46,8 @@ class Refiner(Recurrent):
 
     Raises
     ------
-    ModelError : the encoding is no `JointAngles`, reach or slow is not above 0, or a normaliser is for something else.
+    ModelError : the encoding is no `JointAngles`, reach or slow is not above 0, or a normaliser is
+        for something else.
     """
 
     layers = 1
@@ -128,9 +129,8 @@ class Refiner(Recurrent):
     @staticmethod
     def _steps(features: Tensor, before: Tensor, now: Tensor) -> Tensor:
         """Steps and turns (..., 3) of a root that was, and is, so far from its place."""
-        x, _, z = (turned(now, features[..., 2]) - before).unbind(
-            -1
-        )  # in the frame before's heading
+        # a step is seen from the frame before it, and so is the offset of now, turned back to there
+        x, _, z = (turned(now, features[..., 2]) - before).unbind(-1)
         return features[..., :3] + torch.stack([x, z, torch.zeros_like(x)], dim=-1)
 
     def _seen(self, features: Tensor) -> State:

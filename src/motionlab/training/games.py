@@ -62,7 +62,8 @@ class GamePreset:
     """Frames that the discriminator sees at a time, as in Shrivastava and others, 2017: who sees a
     third of a second knows feet that slide, and does not mind who walks where; 0: whole windows."""
     slow: float = 0.0
-    """Metres a second below which both see toes enlarged (see `models.Refiner`); 0: not."""
+    """Metres a second below which both see toes' velocities enlarged, and the discriminator sudden
+    changes (see `models.Refiner`, `Discriminator`); 0: not."""
     reach: float = 0.0
     """Metres that the root may be moved (see `Refiner`); 0: its steps are corrected."""
     change_weight: float = 0.0
