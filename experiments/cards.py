@@ -13,7 +13,8 @@ from torch import nn
 
 import motionlab
 from motionlab import MotionLabError, datasets, weights
-from motionlab.training import PRESETS, Prepared
+from motionlab.training import GAMES, PRESETS, Prepared
+from motionlab.training.games import GamePreset
 
 PAPERS = {
     "LstmGmm": """\
@@ -35,6 +36,13 @@ Nothing steers it, and it draws no lots: one start has one future. It has seen a
 people, and nothing keeps a bone's length. How long its dances last stands in
 `results/dances_rollouts.json` and in the book.""",
 }
+MEASURES = {
+    "foot skate (cm/s)": "foot skate, cm/s",
+    "jerk (m/s³)": "jerk, m/s³",
+    "frechet": "Fréchet distance",
+    "critic": "critic's accuracy",
+}
+NO_PRESET = "No preset of this version has the settings of these weights."
 
 
 def command_of(made: dict, source: str) -> str:
@@ -49,7 +57,21 @@ def command_of(made: dict, source: str) -> str:
                 options.insert(0, f"--from {shipped_as(made['start']) or 'WEIGHTS'}")
             command = f"motionlab train {made['name']} --preset {title} --data {source}"
             return " ".join([command, *options])
-    raise MotionLabError("No preset of this version has the settings of these weights.")
+    raise MotionLabError(NO_PRESET)
+
+
+def command_of_game(made: dict, generator: str) -> str:
+    """The command line that makes such a refiner again."""
+    trained = GamePreset(**made["preset"])
+    for title, preset in GAMES[made["name"]].items():
+        differ = [key for key, value in asdict(preset).items() if getattr(trained, key) != value]
+        if set(differ) <= {"steps", "seed"}:
+            options = {"steps": "--updates", "seed": "--seed"}
+            more = [f"{options[key]} {getattr(trained, key)}" for key in differ]
+            if generator != made["name"].replace("refiner", "lstm-gmm"):
+                more.insert(0, f"--from {generator}")
+            return " ".join([f"motionlab train {made['name']} --preset {title}", *more])
+    raise MotionLabError(NO_PRESET)
 
 
 def shipped_as(sha256: str) -> str | None:
@@ -68,13 +90,12 @@ def card(
     commercial: bool,
     remark: str = "",
 ) -> str:
-    """The model card, in Markdown; clips, minutes: of training motion; remark: on what it can't do."""
+    """A generator's card, in Markdown; clips, minutes: of training motion; remark: on its limits."""
     kind, name = type(model).__name__, about["name"]
     toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
     begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
     mirrored = ", half of them mirror images" if kind == "LstmGmm" else ""
     sampling = ", ".join(f"{key} {value:g}" for key, value in about["sampling"].items())
-    parameters = sum(parameter.numel() for parameter in model.parameters())
     return f"""\
 # {name}
 
@@ -88,9 +109,7 @@ motion = model.encoding.to_motion(features[0])
 
 | | |
 |---|---|
-| made by | `{about["command"]}` |
-| and | `{shlex.join(["python", *sys.argv])}` |
-| motionlab | {motionlab.__version__}, torch {torch.__version__} |
+{_made_by(about)}
 | updates | {about["update"]}{", the best of validation" if kind == "LstmGmm" else ""} |
 | seed | {about["preset"]["seed"]} |
 | began with | {begun} |
@@ -98,16 +117,12 @@ motion = model.encoding.to_motion(features[0])
 | time until then | {about["seconds"] / 3600:.2f} h |
 | data | `{about["data_name"]}`, sha256 {about["data"]} |
 | training clips | {clips}, {minutes:.1f} minutes{mirrored} |
-| size | {parameters:,} parameters in half precision, {size / 2**20:.1f} MiB |
+| size | {_parameters(model)}, {size / 2**20:.1f} MiB |
 {_held_out(about)}
 | sampling that suits it | {sampling or "as learned"} |
 | starts | {"; ".join(about["starts"])} |
 
-## Settings of the training
-
-```json
-{json.dumps(about["preset"], indent=1)}
-```
+{_settings(about)}
 
 ## Meant for
 
@@ -119,13 +134,85 @@ apart.
 
 {LIMITS[kind].format(name=name)}{remark and f" {remark}"}
 
+{_licence(sources, commercial)}
+"""
+
+
+def refiner_card(about: dict, model: nn.Module, size: int, sources: str, commercial: bool) -> str:
+    """A refiner's card, in Markdown."""
+    name, generator = about["name"], about["generator"]
+    return f"""\
+# {name}
+
+A recurrent network (Refiner; Wang, Chai and Xia, *Combining Recurrent Neural Networks and Adversarial
+Training for Human Motion Synthesis and Control*, 2021, section 4.2) that corrects motion of
+`{generator}`, frame by frame and never looking ahead, so that its feet slide less. It is no release of
+the authors of the paper, and its training differs from theirs: see the settings.
+
+```python
+model, refiner = motionlab.load("{generator}"), motionlab.load("{name}")
+features = refiner(model.generate(300, model.starts[0], **model.sampling))
+motion = model.encoding.to_motion(features[0])
+```
+
+| | |
+|---|---|
+{_made_by(about)}
+| refines | `{generator}`, sha256 {about["generator_hash"]} |
+| step | {about["step"]} of {about["preset"]["steps"]}, chosen by `motionlab.training.judging` |
+| seed | {about["preset"]["seed"]} |
+| time until then | {about["seconds"] / 60:.0f} minutes on one core |
+| data | `{about["data_name"]}`, sha256 {about["data"]} |
+| size | {_parameters(model)}, {size / 2**10:.0f} KiB |
+
+{_judged(about)}
+
+{_settings(about)}
+
+## Meant for
+
+Learning how such networks work, and motion of `{generator}` whose feet hold the ground better. Not for
+motion of other generators, which it has not seen.
+
+## What it can't do
+
+It looks at what has been, not at what comes, and corrects by centimetres: feet still slide, by less.
+`motionlab sample --lock-feet` holds them. It knows level ground, and no other body than the canonical one.
+
+{_licence(sources, commercial)}
+"""
+
+
+def _made_by(about: dict) -> str:
+    """Rows on what made the weights."""
+    return f"""\
+| made by | `{about["command"]}` |
+| and | `{shlex.join(["python", *sys.argv])}` |
+| motionlab | {motionlab.__version__}, torch {torch.__version__} |"""
+
+
+def _parameters(model: nn.Module) -> str:
+    count = sum(parameter.numel() for parameter in model.parameters())
+    return f"{count:,} parameters in half precision"
+
+
+def _settings(about: dict) -> str:
+    return f"""\
+## Settings of the training
+
+```json
+{json.dumps(about["preset"], indent=1)}
+```"""
+
+
+def _licence(sources: str, commercial: bool) -> str:
+    return f"""\
 ## Licence
 
 {"The licences of its data allow commercial use." if commercial else "Not for commercial use: some of its data are not."}
 Who passes these weights on names the sources:
 
-{sources}
-"""
+{sources}"""
 
 
 def _held_out(about: dict) -> str:
@@ -142,6 +229,25 @@ def _held_out(about: dict) -> str:
         f"{half['high']:.3f}] over {half['clips']} validation clips |\n"
         f"| what rounding costs | {full['value'] - half['value']:.4f} nats a frame |"
     )
+
+
+def _judged(about: dict) -> str:
+    """What becomes of motion, by the rounded refiner and by it as it was trained."""
+    full, half = about["judged"]["full"], about["judged"]["half"]
+    real = about["real"] | {"frechet": 0.0, "critic": 0.5}
+    rows = "\n".join(
+        f"| {title} | {real[key]:.3g} | {about['unrefined'][key]:.3g} | {half[key]:.3g} | "
+        f"{full[key]:.3g} |"
+        for key, title in MEASURES.items()
+    )
+    return f"""\
+On validation clips and samples of 10 s that go on from them:
+
+| | real | unrefined | refined | before rounding |
+|---|---|---|---|---|
+{rows}
+
+Half of the roots end within {100 * half["root (m)"]:.1f} cm of where they would have after 10 s."""
 
 
 def licences(data: Prepared) -> tuple[str, bool]:

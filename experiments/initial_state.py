@@ -39,9 +39,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--output", type=Path, default=Path("results/initial_state.json"))
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
-    model, data = motionlab.load(chosen.model), Prepared.find(chosen.data)
-    if "contacts" not in model.encoding.slices:
-        data = data.without_contacts()
+    model = motionlab.load(chosen.model)
+    data = Prepared.find(chosen.data).matching(model.encoding)
     clips = middles(data.clips(chosen.split))
     found = measured(model, clips, chosen.iterations)
     about = about_weights(model, weights.find(chosen.model))

@@ -18,12 +18,12 @@ import numpy as np
 import record
 import rollouts
 import torch
+from recorded import recorded_clips
 from rollouts import KINDS, OBSERVED, Judge
 from torch import Tensor, nn
 
 import motionlab
 from motionlab import contacts, metrics
-from motionlab.datasets.registry import choose
 from motionlab.encodings import BodyFrame, Encoding, Normalizer
 from motionlab.training import Prepared
 from motionlab.training.checkpoints import write_whole
@@ -55,9 +55,8 @@ def main(arguments: list[str] | None = None) -> None:
     sampling = dict(model.sampling)
     if chosen.temperature:
         sampling["temperature"] = chosen.temperature
-    data = full = Prepared.find(chosen.data)
-    if "contacts" not in model.encoding.slices:
-        data = full.without_contacts()
+    full = Prepared.find(chosen.data)
+    data = full.matching(model.encoding)
     judge = rollouts.judge_of(data)
     seen = round(OBSERVED * model.fps)
     clips = [clip for clip in data.clips("test") if len(clip) >= seen]
@@ -84,17 +83,9 @@ def variety(
     model: nn.Module, data: Prepared, judge: Judge, seed: int, sampling: dict, split: str = "test"
 ) -> dict[str, dict]:
     """How samples from one start differ, beside how people do who do one thing again."""
-    fps, about = model.fps, {f"{c.source}/{c.name}": c for c in choose("locomotion")}
+    fps, points = model.fps, model.encoding.positions
     seen, after = round(OBSERVED * fps), round(AFTER * fps)
-    points = model.encoding.positions
-    clips = [
-        (about[name], its_split, clip)  # mirrored ones are in no table
-        for name, its_split, clip in zip(
-            data.names, data.splits, data.features.split(data.lengths.tolist()), strict=True
-        )
-        if name in about
-    ]
-    result = {}
+    clips, result = recorded_clips(data), {}
     for gait, (actions, seconds) in GAITS.items():
         piece = round(seconds * fps)
         real = defaultdict(list)

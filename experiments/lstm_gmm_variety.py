@@ -39,9 +39,7 @@ def main(arguments: list[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
     model, path = motionlab.load(chosen.model), find(chosen.model)
-    data = Prepared.find(chosen.data)
-    if "contacts" not in model.encoding.slices:
-        data = data.without_contacts()
+    data = Prepared.find(chosen.data).matching(model.encoding)
     judge = rollouts.judge_of(data)
     rows = []
     for changed, sampling in settings(model, data):

@@ -22,17 +22,17 @@ import numpy as np
 import record
 import torch
 from lstm_gmm_samples import GAITS
+from recorded import recorded_clips
 from torch import Tensor, nn
 
 import motionlab
 from motionlab import contacts, metrics
-from motionlab.datasets.registry import choose
 from motionlab.encodings import JointAngles
 from motionlab.metrics import Interval
 from motionlab.solvers import lock_feet
 from motionlab.training import Prepared
-from motionlab.training.adversarial import OBSERVED
 from motionlab.training.evaluation import measured
+from motionlab.training.finish import OBSERVED
 from motionlab.training.judging import critic
 from motionlab.weights import find
 
@@ -87,7 +87,7 @@ def of_gait(gait: str, models: dict, data: Prepared, count: int, seed: int) -> d
     """All variants of one gait, beside recorded motion."""
     variants: dict[str, Variant] = {}
     for (raw, refined), (generator, refiners) in models.items():
-        own = data if "contacts" in generator.encoding.slices else data.without_contacts()
+        own = data.matching(generator.encoding)
         clips = {split: clips_of(own, gait, split) for split in ("test", "val")}
         numbers = {"test": count, "val": CHECKED * len(clips["val"])}
         made = {split: samples(generator, clips[split], numbers[split], seed) for split in clips}
@@ -135,16 +135,12 @@ def about_variant(variant: Variant, raw: Variant) -> dict:
 
 def clips_of(data: Prepared, gait: str, split: str) -> list[Tensor]:
     """Features of the split's recorded clips of a gait, two seconds and longer."""
-    about = {f"{clip.source}/{clip.name}": clip for clip in choose("locomotion")}
-    seen = round(OBSERVED * data.encoding.fps)
+    seen, (actions, _) = round(OBSERVED * data.encoding.fps), GAITS[gait]
     return [
         clip
-        for name, its, clip in zip(
-            data.names, data.splits, data.features.split(data.lengths.tolist()), strict=True
-        )
-        if its == split and name in about and len(clip) >= seen
-        and about[name].action.startswith(GAITS[gait][0])
-    ]  # fmt: skip
+        for entry, its_split, clip in recorded_clips(data)
+        if its_split == split and len(clip) >= seen and entry.action.startswith(actions)
+    ]
 
 
 def samples(generator: nn.Module, clips: Sequence[Tensor], count: int, seed: int) -> Tensor:

@@ -57,15 +57,9 @@ def ship(
     name: str, file: Path, source: str, folder: Path, sampling: dict[str, float], remark: str = ""
 ) -> Path:
     """Write NAME.safetensors and NAME.md; returns the path of the weights."""
-    data = Prepared.find(source)
-    model, made = load_weights(file)
-    if made["data"] != data.hash:
-        raise MotionLabError(f"{file}: was not trained on {source}; name the data that it was.")
+    data, model, made = with_data(file, source)
     licence = licences(data)  # of an unknown source: fails before anything is written
-    halved = copy.deepcopy(model)
-    for parameter in halved.parameters():
-        parameter.data = parameter.half().float()
-    halved.eval()
+    halved = rounded(model)
     ready = mixture if isinstance(model, LstmGmm) else dancer
     before, starts, sampling, facts = ready(model, halved, data, made, sampling)
     with torch.no_grad():  # by the network as it will be
@@ -91,6 +85,23 @@ def ship(
     return path
 
 
+def with_data(file: Path, source: str) -> tuple[Prepared, nn.Module, dict]:
+    """The data that weights were trained on, the weights, and what is said of them."""
+    data = Prepared.find(source)
+    model, made = load_weights(file)
+    if made["data"] != data.hash:
+        raise MotionLabError(f"{file}: was not trained on {source}; name the data that it was.")
+    return data, model, made
+
+
+def rounded(model: nn.Module) -> nn.Module:
+    """A copy, for use, with parameters as half precision has them."""
+    copied = copy.deepcopy(model).eval()
+    for parameter in copied.parameters():
+        parameter.data = parameter.half().float()
+    return copied
+
+
 Ready = tuple[Tensor, list[str], dict[str, float], dict]
 
 
@@ -98,8 +109,7 @@ def mixture(
     model: nn.Module, halved: nn.Module, data: Prepared, made: dict, sampling: dict
 ) -> Ready:
     """Frames before each start (starts, frames, dim), names, sampling, and what else to know."""
-    has_contacts = "contacts" in model.encoding.slices
-    clips = (data if has_contacts else data.without_contacts()).clips("val")
+    clips = data.matching(model.encoding).clips("val")
     if "temperature" not in sampling:
         sampling = {"temperature": fit_temperature(halved, clips, **sampling)} | sampling
     starts, observed = choose(candidates(data)), round(OBSERVED * model.fps)

@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import record
 import torch
+from recorded import recorded_clips
 from torch import Tensor, nn
 
 import motionlab
-from motionlab.datasets.registry import choose
 from motionlab.encodings import BodyFrame, Normalizer
 from motionlab.training import Prepared
-from motionlab.training.adversarial import OBSERVED
+from motionlab.training.finish import OBSERVED
 from motionlab.weights import find
 
 WINDOW, STEP = 2.0, 0.5  # seconds that are named at a time, and from one to the next
@@ -55,9 +55,7 @@ def main(arguments: list[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
     model, path = motionlab.load(chosen.model), find(chosen.model)
-    data = Prepared.find(chosen.data)
-    if "contacts" not in model.encoding.slices:
-        data = data.without_contacts()
+    data = Prepared.find(chosen.data).matching(model.encoding)
     clips = clips_of(data)
     count = Counter(clip.style for clip in clips if clip.split == "test")
     styles = sorted(style for style, clips_there in count.items() if clips_there >= ENOUGH)
@@ -93,7 +91,6 @@ def main(arguments: list[str] | None = None) -> None:
             for split, found in told.items()
         },
         "samples": chosen.samples,
-        "from a start of": starts["as it ships"],
         "how it moves": {
             way: sum(its["effective styles"] for its in told.values()) / len(told)
             for way, told in starts.items()
@@ -105,13 +102,10 @@ def main(arguments: list[str] | None = None) -> None:
 
 def clips_of(data: Prepared) -> list[Clip]:
     """All clips of the data set that are recorded, not mirrored, with style and action."""
-    about = {f"{clip.source}/{clip.name}": clip for clip in choose("locomotion")}
     return [
-        Clip(about[name].style, split, about[name].action, features)
-        for name, split, features in zip(
-            data.names, data.splits, data.features.split(data.lengths.tolist()), strict=True
-        )
-        if name in about and len(features) >= WINDOW * data.encoding.fps
+        Clip(entry.style, split, entry.action, features)
+        for entry, split, features in recorded_clips(data)
+        if len(features) >= WINDOW * data.encoding.fps
     ]
 
 

@@ -237,7 +237,7 @@ def _fit_and_not_worse(outcomes: dict[str, str]) -> str:
     return PARTLY if set(outcomes.values()) & {BETTER, LEANING} else NOT
 
 
-# -- W3, W4, W8, W10 ----------------------------------------------------------------------------------
+# -- W3, W4, W8, W10, W11 -------------------------------------------------------------------------
 
 
 SKATE, JERK = "foot skate (cm/s)", "jerk (m/s³)"
@@ -330,10 +330,8 @@ def w10(limits: dict, found: dict) -> Verdict:
 
 def w11(limits: dict, found: dict) -> Verdict:
     its = found["classifier"]["test"]
-    one, each = (
-        its["effective styles of one"],
-        [start["effective styles"] for start in found["from a start of"].values()],
-    )
+    one = its["effective styles of one"]
+    each = [start["effective styles"] for start in found["ways"]["as it ships"].values()]
     mean = sum(each) / len(each)
     numbers = {
         "classifier's accuracy on held-out clips": its["accuracy"],
@@ -350,8 +348,8 @@ def w11(limits: dict, found: dict) -> Verdict:
 RULES = {
     "W1-variety": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
     "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
-    "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W3": w3, "W4": w4, "W4-generator": w4_generator,
-    "W8": w8, "W10": w10, "W11": w11, **verdicts_aclstm.RULES,
+    "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W3": w3, "W4": w4,
+    "W4-generator": w4_generator, "W8": w8, "W10": w10, "W11": w11, **verdicts_aclstm.RULES,
 }  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def refined(skate=0.4, jerk=0.4, critic=0.7, moved=1.0, gain=-1.0, f1=0.95, cont
 def styles(accuracy=0.8, one=1.5, each=(2.5, 2.5)):
     told = {"accuracy": accuracy, "effective styles of one": one}
     starts = {str(i): {"effective styles": value} for i, value in enumerate(each)}
-    return {"classifier": {"test": told}, "from a start of": starts}
+    return {"classifier": {"test": told}, "ways": {"as it ships": starts}}
 
 
 CASES = [

@@ -176,6 +176,16 @@ def test_the_refiner_that_is_kept_can_be_an_average(gaits, generator, game, tmp_
         assert torch.allclose(kept[step], mean, atol=1e-7)
 
 
+def test_a_generator_without_contacts_needs_no_data_without(game, gaits, smoke, tmp_path):
+    plain = build(gaits.without_contacts(), smoke()).eval().requires_grad_(False)
+    plain.sampling = {"temperature": 0.1}
+    game(tmp_path / "a", generator=plain)
+    game(tmp_path / "b", generator=plain, data=gaits.without_contacts())
+    refiner, about = load_weights(tmp_path / "a" / "at-4.safetensors")
+    assert refiner.encoding.config() == plain.encoding.config() and about["data"] == gaits.hash
+    assert same(tmp_path / "a", tmp_path / "b", 4)
+
+
 def test_a_heavier_root_weight_keeps_roots_nearer(game, tmp_path):
     long = replace(SMALL, steps=20, validate_every=20)
     light, heavy = (

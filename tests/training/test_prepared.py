@@ -10,7 +10,7 @@ import torch
 from motionlab import Skeleton, datasets, write_bvh
 from motionlab.__main__ import main
 from motionlab.encodings import JointAngles, Normalizer
-from motionlab.errors import DataError
+from motionlab.errors import DataError, TrainingError
 from motionlab.training import Prepared, prepare
 from motionlab.training.prepared import file_of
 
@@ -55,6 +55,18 @@ def test_without_contacts_is_the_encoding_without(gaits):
     its = Normalizer.fit(plain.clips("train")).state_dict()
     for name, value in plain.normalizer.state_dict().items():
         torch.testing.assert_close(value, its[name])
+
+
+def test_data_match_an_encoding_that_has_no_contacts(gaits):
+    plain = gaits.without_contacts()
+    assert gaits.matching(gaits.encoding) is gaits and plain.matching(plain.encoding) is plain
+    found = gaits.matching(plain.encoding)
+    assert torch.equal(found.features, plain.features) and found.hash == gaits.hash
+    assert found.encoding.config() == plain.encoding.config()
+    fast = JointAngles(Skeleton.canonical(), fps=60.0)
+    for data, encoding in ((plain, gaits.encoding), (gaits, fast), (plain, fast)):
+        with pytest.raises(TrainingError, match="features of another kind than the model's"):
+            data.matching(encoding)
 
 
 def test_the_hash_tells_data_apart(gaits, tmp_path):

@@ -74,4 +74,4 @@ def test_what_cannot_be_shipped_is_said(experiment, played, shipped, gaits, tmp_
     assert not list(tmp_path.glob("x.*"))
     settings = {"preset": vars(GAMES["refiner"]["ship"]) | {"width": 7}, "name": "refiner"}
     with pytest.raises(MotionLabError, match="No preset"):
-        script.command_of(settings, "lstm-gmm")
+        experiment("cards").command_of_game(settings, "lstm-gmm")

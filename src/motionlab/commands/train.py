@@ -107,8 +107,6 @@ class Train:
         generator = load(self.start or self.model.replace("refiner", "lstm-gmm"))
         check_generates(generator, self.start or self.model)
         data = Prepared.find(self.data or "locomotion")
-        if "contacts" not in generator.encoding.slices:
-            data = data.without_contacts()
         judge = Judge(generator, data)  # says now what it would have to say after the game
         device = None if self.accelerator == "auto" else self.accelerator
         train_game(generator, data, preset, out, name=self.model, device=device, progress=True)

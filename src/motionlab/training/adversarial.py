@@ -34,12 +34,12 @@ from ..models.refiner import (
     telling_loss,
 )
 from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
+from .finish import OBSERVED
 from .games import GamePreset
 from .loop import CHECKPOINT
 from .prepared import Prepared
 from .windows import Windows
 
-OBSERVED = 2.0  # seconds of real motion that a sample of the generator goes on from
 HAIR = 0.1  # deviation of the noise by which the discriminator's steepness is felt
 
 
@@ -90,7 +90,7 @@ def train_game(
     Parameters
     ----------
     generator : whose motion is to be refined, such as the shipped LSTM-GMM; not changed.
-    data : real motion, in the generator's encoding.
+    data : real motion, in the generator's encoding, or with contacts besides.
     folder : receives ``checkpoint.safetensors`` to go on from, ``curve.json``, and the refiner as
         ``at-STEP.safetensors`` at every validation: which is best, an independent judge says.
     name : of the refiner, kept with its weights.
@@ -108,8 +108,7 @@ def train_game(
     TrainingError : data of another encoding, the folder holds another game, or can't be written.
     DivergedError : a loss or its gradient is no longer a number.
     """
-    if generator.encoding.config() != data.encoding.config():
-        raise TrainingError("The generator makes features of another kind than the data's.")
+    data = data.matching(generator.encoding)
     device = torch.device(device or ("cuda" if torch.cuda.is_available() else "cpu"))
     folder, game = Path(folder), new_game(data, preset).to(device)
     optimizer = torch.optim.RMSprop(

@@ -115,10 +115,7 @@ def _fitting(model: nn.Module, data: Prepared, split: str) -> tuple[Prepared, li
     """The data as the model's encoding has them, and the clips of a split."""
     if split not in SPLITS:
         raise TrainingError(f"There is no split {split!r}; there are {', '.join(SPLITS)}.")
-    if "contacts" not in model.encoding.slices and "contacts" in data.encoding.slices:
-        data = data.without_contacts()
-    if model.encoding.config() != data.encoding.config():
-        raise TrainingError("The data are features of another kind than these weights are for.")
+    data = data.matching(model.encoding)
     if not (clips := data.clips(split)):
         raise TrainingError(f"The data have no clips in the split {split!r}.")
     return data, clips

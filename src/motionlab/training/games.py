@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from ..errors import TrainingError
-
-BEST = "best.safetensors"
+from .presets import BEST
 
 
 @dataclass(frozen=True)
@@ -15,7 +14,7 @@ class GamePreset:
     """Settings of an adversarial training; as they stand, the paper's.
 
     Each of its five tricks can be left out: `warmup` 0, `turns` 1, `history` 0, `balance` False,
-    `root_weight` 0. What comes after `clip` are remedies that are not in the paper, all off.
+    `root_weight` 0. From `clip` to `average` are remedies that are not in the paper, all off.
     """
 
     steps: int

@@ -22,9 +22,10 @@ from ..encodings import JointAngles, from_config
 from ..errors import TrainingError
 from ..models import Discriminator
 from ..models.refiner import effector_normalizer, telling_loss
-from .adversarial import OBSERVED
 from .checkpoints import load_weights, save_weights, write_whole
+from .finish import OBSERVED
 from .prepared import Prepared
+from .presets import BEST
 
 STRAYED = 0.05  # metres that half of the roots may have been moved after ten seconds, if at all
 PIECE = 1.0  # seconds that the critic sees at a time
@@ -119,7 +120,7 @@ class Judge:
     Parameters
     ----------
     generator : as it was refined.
-    data : in its encoding.
+    data : in its encoding, or with contacts besides.
     split : whose clips of two seconds and more are used.
     seconds : length of a sample.
     seed : of the samples' chance.
@@ -137,8 +138,7 @@ class Judge:
         seconds: float = 10.0,
         seed: int = 0,
     ) -> None:
-        if generator.encoding.config() != data.encoding.config():
-            raise TrainingError("The generator makes features of another kind than the data's.")
+        data = data.matching(generator.encoding)
         seen = round(OBSERVED * generator.fps)
         clips = [clip for clip in data.clips(split) if len(clip) >= seen]
         if len(clips) < 4:
@@ -207,7 +207,7 @@ class Judge:
         }
 
 
-def choose(folder: str | os.PathLike, judge: Judge, out: str = "best.safetensors") -> dict:
+def choose(folder: str | os.PathLike, judge: Judge, out: str = BEST) -> dict:
     """Judge every refiner that a game has kept, and copy the one of least score to `out`.
 
     Returns what was found of it, with its `step`; the same of all is in ``judged.json``.
@@ -223,10 +223,10 @@ def choose(folder: str | os.PathLike, judge: Judge, out: str = "best.safetensors
         raise TrainingError(f"{folder}: no refiner is here; `train_game` leaves them.")
     rows = []
     for step, path in sorted(steps.items()):
-        refiner, about = load_weights(path)
+        refiner, _ = load_weights(path)
         rows.append({"step": step} | judge(refiner.eval()))
-    about_all = {"real": judge.real, "unrefined": judge.unrefined, "refined": rows}
-    text = json.dumps(_finite(about_all), indent=1, allow_nan=False, ensure_ascii=False)
+    told = {"real": judge.real, "unrefined": judge.unrefined, "refined": rows}
+    text = json.dumps(_finite(told), indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(folder / JUDGED, lambda stream: stream.write(text.encode()))
     best = min(rows, key=lambda row: row["score"])
     if not math.isfinite(best["score"]):
@@ -235,7 +235,7 @@ def choose(folder: str | os.PathLike, judge: Judge, out: str = "best.safetensors
             "seconds; play with a heavier root_weight, or a reach."
         )
     refiner, about = load_weights(steps[best["step"]])
-    save_weights(folder / out, refiner, about | {"judged": best, "beside": about_all["unrefined"]})
+    save_weights(folder / out, refiner, about | {"judged": best, "beside": judge.unrefined})
     return best
 
 

@@ -21,7 +21,7 @@ from torch import Tensor
 
 from .. import datasets, encodings
 from ..encodings import JointAngles, Normalizer, RootRelative
-from ..errors import DataError
+from ..errors import DataError, TrainingError
 from ..motion import Motion
 from ..skeleton import Skeleton
 from .checkpoints import write_whole
@@ -71,6 +71,22 @@ class Prepared:
         normalizer.kept.copy_(full.kept[full.kept < encoding.dim])
         features = self.features[:, : encoding.dim].contiguous()
         return replace(self, features=features, encoding=encoding, normalizer=normalizer)
+
+    def matching(self, encoding: encodings.Encoding) -> Prepared:
+        """These data as an encoding has them: without contacts if it has none.
+
+        Raises
+        ------
+        TrainingError : they are features of another kind.
+        """
+        more = "contacts" in self.encoding.slices and "contacts" not in encoding.slices
+        data = self.without_contacts() if more else self
+        if data.encoding.config() != encoding.config():
+            raise TrainingError(
+                "The data are features of another kind than the model's: with contacts or without, "
+                "as angles or not, of another body or frame rate."
+            )
+        return data
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the file; it appears whole or not at all. Raises DataError if it can't be."""
