@@ -4,11 +4,13 @@
 
 The paper's game and ours, whole with three seeds and without each of their tricks with one, all with
 as many updates of the refiner. Each is kept in runs/games/: stopped and started again, it goes on.
+One walk, refined by each, lies in results/refiner_walks.json, to be looked at.
 """
 
 from __future__ import annotations
 
 import argparse
+import base64
 import json
 import time
 from collections.abc import Sequence
@@ -16,7 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import record
+import torch
 
 import motionlab
 from motionlab.errors import DivergedError
@@ -36,6 +40,9 @@ PAPER = replace(
     discriminator_width=OURS.discriminator_width,
 )  # fmt: skip
 ONE_TURN = {"turns": 1, "steps": OURS.steps - 74, "validate_every": 20}
+# Nothing but lambda holds the root: its steps are corrected, not its place, and changes are free.
+FREE = replace(OURS, reach=0.0, change_weight=0.0)
+SECONDS = 5.0  # of the walk that every refiner refines
 
 
 class Row(NamedTuple):
@@ -56,6 +63,9 @@ ROWS = {
     "paper without history": Row(PAPER, {"history": 0}),
     "paper without balance": Row(PAPER, {"balance": False}),
     "paper without root term": Row(PAPER, {"root_weight": 0.0}),
+    "paper with instance noise": Row(PAPER, {"instance_noise": 0.5}),
+    "paper with spectral norm": Row(PAPER, {"spectral": True}),
+    "paper with less steepness": Row(PAPER, {"steepness_weight": 0.3}),
     "ours": Row(OURS, {}, SEEDS),
     "ours, may be steep": Row(OURS, {"steepness_weight": 0.0}),
     "ours, sees whole windows": Row(OURS, {"piece": 0}),
@@ -64,6 +74,10 @@ ROWS = {
     "ours, changes for free": Row(OURS, {"change_weight": 0.0}),
     "ours, not averaged": Row(OURS, {"average": 0.0}),
     "ours without history": Row(OURS, {"history": 0}),
+    **{
+        f"root in steps, lambda {weight:g}": Row(FREE, {"root_weight": weight})
+        for weight in (0.0, 1.0, 20.0, 400.0, 8000.0)
+    },
 }
 
 
@@ -73,6 +87,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--share", default="1/1", help="this process's part of the games")
     parser.add_argument("--list", action="store_true", help="show what is done, and stop")
     parser.add_argument("--output", default="results/refiner_games.json")
+    parser.add_argument("--walks", default="results/refiner_walks.json")
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
     games = sorted(
@@ -83,7 +98,7 @@ def main(arguments: list[str] | None = None) -> None:
             print(f"{'done' if told_in(name, seed).exists() else '':5} {name}, seed {seed}")
         return
     generator = motionlab.load("lstm-gmm")
-    data = Prepared.find(chosen.data).without_contacts()
+    data = Prepared.find(chosen.data)
     judge, (part, parts) = None, map(int, chosen.share.split("/"))
     for name, seed in games[part - 1 :: parts]:
         if not told_in(name, seed).exists():
@@ -100,7 +115,9 @@ def main(arguments: list[str] | None = None) -> None:
             for name, row in ROWS.items()
         }
         result = {"real": judge.real, "unrefined": judge.unrefined, "rows": rows}
-        record.write(record.provenance(begin, 0, data) | result, chosen.output)
+        about = record.provenance(begin, 0, data)
+        record.write(about | result, chosen.output)
+        record.write(about | walks(generator), chosen.walks)
 
 
 def folder_of(name: str, seed: int) -> Path:
@@ -129,6 +146,28 @@ def play(generator, data: Prepared, judge: Judge, name: str, seed: int) -> dict:
         }
     refiner, _ = load_weights(folder / f"at-{preset.steps}.safetensors")
     return {"seed": seed, "changes": row.changes, "curve": curve, "after": judge(refiner.eval())}
+
+
+@torch.no_grad()
+def walks(generator) -> dict:
+    """One walk that the generator dreams, as it is and as each game's refiner of seed 0 has it."""
+    start = next(i for i, name in enumerate(generator.start_names) if name.startswith("walk"))
+    walk = generator.generate(
+        round(SECONDS * generator.fps), generator.starts[[start]],
+        generator=torch.Generator().manual_seed(2), **generator.sampling,
+    )  # fmt: skip
+    refined = {}
+    for name, row in ROWS.items():
+        path = folder_of(name, 0) / f"at-{row.preset(0).steps}.safetensors"
+        if path.exists():
+            refined[name] = packed(load_weights(path)[0].eval()(walk)[0])
+    return {"fps": generator.fps, "unrefined": packed(walk[0]), "refined": refined}
+
+
+def packed(features: torch.Tensor) -> dict:
+    """Features (frames, dim) as JSON holds them: half precision in base64."""
+    halves = features.numpy().astype(np.float16)
+    return {"shape": list(halves.shape), "float16": base64.b64encode(halves.tobytes()).decode()}
 
 
 if __name__ == "__main__":

@@ -155,6 +155,11 @@ def test_values_over_time_are_in_seconds():
     assert np.isnan(axes.lines[1].get_ydata()[1])
 
 
+def test_values_over_time_can_have_a_logarithmic_axis():
+    (axes,) = plots.over_time({"a": [0, 1, 100]}, fps=10, y="cm/s", log=True).axes
+    assert axes.get_yscale() == "log" and axes.yaxis.get_major_formatter()(10) == "10"
+
+
 def test_feature_maps_name_their_parts():
     maps = {"one": np.zeros((5, 4)), "two": np.ones((5, 6))}
     groups = {name: {"root": slice(0, 2), "pose": slice(2, 4)} for name in maps}

@@ -174,8 +174,13 @@ def scatter(
 
 
 @styled
-def over_time(lines: Mapping[str, Sequence[float]], fps: float, y: str) -> Figure:
-    """Named lines of one value a frame, over seconds; frames that are NaN leave a gap."""
+def over_time(
+    lines: Mapping[str, Sequence[float]], fps: float, y: str, log: bool = False
+) -> Figure:
+    """Named lines of one value a frame, over seconds; frames that are NaN leave a gap.
+
+    log : a logarithmic axis of values, on which those of 0 and less leave gaps, too.
+    """
     check_named("over_time", lines)
     check_rate("over_time", fps)
     figure, axes = plt.subplots(figsize=(7.5, 3.2))
@@ -184,6 +189,9 @@ def over_time(lines: Mapping[str, Sequence[float]], fps: float, y: str) -> Figur
         color = palette.color(name, index)
         axes.plot(np.arange(len(values)) / fps, values, label=name, color=color)
     axes.set(xlabel="time (s)", ylabel=y)
+    if log:
+        axes.set_yscale("log", nonpositive="mask")
+        axes.yaxis.set_major_formatter("{x:g}")
     if len(lines) > 1:
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=len(lines))
     return figure
