@@ -5,6 +5,7 @@ from importlib import import_module
 from . import palette
 from .dream import dream
 from .feeding import feeding
+from .knobs import knobs
 from .player import Player, bundle_path
 from .show import show
 
@@ -16,6 +17,7 @@ __all__ = [
     "dream",
     "feeding",
     "filmstrip",
+    "knobs",
     "palette",
     "plots",
     "scene",

@@ -1,0 +1,62 @@
+"""Knobs that act on a motion in a running kernel: the live form of `motionlab.viewer.knobs`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import ipywidgets
+
+from ..errors import MotionLabError
+from .knobs import is_box, made_of
+from .player import Player, payload
+from .show import trail_points
+
+
+def box(
+    make: Callable,
+    values: Mapping[str, Sequence[float]],
+    start: Mapping[str, float],
+    called: Mapping[str, str],
+    caption: str | None,
+    trail: Any,
+    color: str,
+    height: int,
+) -> ipywidgets.VBox:
+    """A player with a field for each knob; parameters as of `knobs`, `called` its labels."""
+    fields = {name: _field(called[name], some, start[name]) for name, some in values.items()}
+    said = ipywidgets.Label()
+
+    def content() -> dict[str, Any]:
+        wanted = {name: field.value for name, field in fields.items()}
+        track, fps, said.value = made_of(make, wanted, color)
+        look = {"height": height, "overlay": False, "follow": True, "autoplay": True}
+        return payload([track], fps, trail=trail_points(trail, [track]), **look)
+
+    player = Player(content(), caption=caption or "")
+
+    def turned(_change: Any) -> None:
+        try:
+            now = content()
+        except MotionLabError as error:
+            said.value = str(error)
+            return
+        with player.hold_sync():  # its clock goes on, so that one sees what the knob does
+            player.frame, player.payload = min(player.frame, now["frames"] - 1), now
+
+    for field in fields.values():
+        field.observe(turned, names="value")
+    needs = ipywidgets.HTML("<small>Needs a kernel: computed anew for every setting.</small>")
+    return ipywidgets.VBox([player, ipywidgets.VBox(list(fields.values())), said, needs])
+
+
+def _field(label: str, some: Sequence[float], value: float) -> ipywidgets.DOMWidget:
+    """A box to tick, or a slider, which counts when it is let go."""
+    common = {"description": label, "style": {"description_width": "170px"}}
+    if is_box(some):
+        return ipywidgets.Checkbox(value=value, **common)
+    step = 10.0 ** math.floor(math.log10((some[-1] - some[0]) / 20))
+    return ipywidgets.FloatSlider(
+        value=value, min=some[0], max=some[-1], step=step, continuous_update=False, **common
+    )
