@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shutil
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
 from motionlab import Motion, Skeleton
+from motionlab.viewer.knobs import knobs
 from motionlab.viewer.player import bundle_path
 from motionlab.viewer.show import show
 
@@ -165,6 +167,32 @@ def test_a_slider_chooses_which_motion_is_seen(browser, page_file):
         assert page.locator(".ml-choose output").inner_text() == "1"
         assert page.locator(".ml-overlay").is_hidden()
         assert page.evaluate("document.querySelector('figure').motionlab.frame") >= 30
+        page.set_viewport_size({"width": 390, "height": 700})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_knobs_change_the_motion_and_what_is_said_of_it(browser, page_file):
+    def make(rise, wide):
+        motion = waving() if wide else waving()[:100]
+        root = motion.root_positions + torch.tensor([0.0, rise, 0.0])
+        return replace(motion, root_positions=root), f"rise {rise:g}, wide {wide}"
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOTIONLAB_VIEWER", "page")
+        figure = knobs(make, {"rise": (0.0, 0.2, 0.5), "wide": (False, True)}, height=240)
+    file = page_file.with_name("knobs.html")
+    file.write_text(PAGE.format(figure.html), encoding="utf-8")
+    chosen = "document.querySelector('figure').motionlab.chosen"
+    with opened(browser, file) as page:
+        page.wait_for_selector("canvas")
+        assert page.locator(".said").inner_text() == "rise 0, wide False"
+        assert page.evaluate(chosen) == 0
+        page.get_by_role("slider", name="rise").focus()
+        page.keyboard.press("ArrowRight")
+        page.get_by_role("checkbox", name="wide").check()
+        assert page.locator(".said").inner_text() == "rise 0.2, wide True"
+        assert page.evaluate(chosen) == 3
+        assert page.locator(".ml-choose").is_hidden()
         page.set_viewport_size({"width": 390, "height": 700})
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
