@@ -10,7 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionlab import Skeleton, contacts
+from motionlab import Skeleton, contacts, load
 from motionlab.contacts import foot_points
 from motionlab.datasets import gaits
 from motionlab.errors import ModelError
@@ -60,6 +60,20 @@ def test_what_slid_holds_still_and_nothing_pops(speed, turn_rate):
     assert torch.equal(locked.root_positions[:, [0, 2]], motion.root_positions[:, [0, 2]])
     arms = [motion.skeleton.index(name) for name in ("left_upper_arm", "right_hand", "head")]
     assert torch.equal(locked.rotations[:, arms], motion.rotations[:, arms])
+
+
+def test_a_leg_that_was_straight_does_not_snap():
+    model, refiner = load("lstm-gmm-contacts"), load("refiner-contacts")
+    start = model.start_names.index("run 2.6 m/s, turn left")  # whose legs are quite straight
+    with torch.no_grad():
+        features = refiner(
+            model.generate(
+                300, model.starts, generator=torch.Generator().manual_seed(3), **model.sampling
+            )
+        )
+    dream = model.encoding.to_motion(features[start])
+    locked = lock_feet(dream, floor=None)
+    assert peak_acceleration(locked) < 1.2 * peak_acceleration(dream)
 
 
 def test_feet_keep_the_way_they_point_and_bones_their_length():

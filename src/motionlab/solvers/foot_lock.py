@@ -30,6 +30,7 @@ FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, w
 FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
 BLEND = 0.25  # seconds from a foot's own way to where it is held
 REACH = 0.97  # share of its length to which a leg may be stretched; near 1 knees snap
+NEAR = 0.04  # metres that a foot may be moved while its leg stays as straight as it was
 STRAIGHT = 0.02  # metres that a knee lies beside its leg; if less, the thigh says where it points
 SETTLE = 0.15  # seconds over which the body comes down if a leg is too short
 
@@ -208,7 +209,9 @@ def _sink(points: Tensor, ankle: Tensor, joints: dict, fps: float) -> Tensor:
     hip, knee = points[..., joints["upper_leg"], :], points[..., joints["lower_leg"], :]
     length = (knee - hip).norm(dim=-1) + (points[..., joints["foot"], :] - knee).norm(dim=-1)
     was = (points[..., joints["foot"], :] - hip).norm(dim=-1)
-    reach = torch.maximum(REACH * length, was.minimum(length))
+    moved = (ankle - points[..., joints["foot"], :]).norm(dim=-1)
+    stays = was.minimum(length) - (moved - NEAR).clamp(min=0)
+    reach = torch.maximum(REACH * length, stays)
     way = hip - ankle
     level = way[..., [0, 2]].square().sum(-1)
     needed = way[..., 1] - (reach.square() - level).clamp(min=1e-4).sqrt()
