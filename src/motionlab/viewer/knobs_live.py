@@ -53,7 +53,8 @@ def box(
 
 def _field(label: str, some: Sequence[float], value: float) -> ipywidgets.DOMWidget:
     """A box to tick, or a slider, which counts when it is let go."""
-    common = {"description": label, "style": {"description_width": "170px"}}
+    layout = ipywidgets.Layout(width="440px")
+    common = {"description": label, "style": {"description_width": "170px"}, "layout": layout}
     if is_box(some):
         return ipywidgets.Checkbox(value=value, **common)
     step = 10.0 ** math.floor(math.log10((some[-1] - some[0]) / 20))
