@@ -61,7 +61,10 @@ def test_a_refiner_is_trained_judged_and_used(here, capsys, monkeypatch):
     assert main([*sample, "refined.bvh", "--refiner", "r/best.safetensors", "--lock-feet"]) == 0
     raw, refined = (motionlab.read_bvh(here / f"{n}.bvh") for n in ("raw", "refined"))
     assert not raw.rotations.equal(refined.rotations)
-    capsys.readouterr()
+    assert "another generator" not in capsys.readouterr().out
+    other = ["sample", "lstm-gmm-contacts", *sample[2:], "b.bvh"]
+    assert main([*other, "--refiner", "r/best.safetensors"]) == 0
+    assert "learned to correct motion of another generator" in capsys.readouterr().out
     for wrong, said in [
         ([*sample, "a.bvh", "--refiner", "g/best.safetensors"], "is no refiner, but LstmGmm"),
         ([*sample, "a.bvh", "--refiner", "none"], "no such file"),

@@ -102,7 +102,7 @@ def test_a_page_says_where_its_knobs_stand_without_scripts(page):
     assert 'max="2" value="1"><output>0.1</output>' in text
     assert "Rise &lt; (m)" in text and "<figcaption>a &lt; b</figcaption>" in text
     assert '<output class="said" aria-live="polite">rise 0.1, still False</output>' in text
-    assert "Runs here" in text and "<noscript><img" in text
+    assert "Computed beforehand" in text and "<noscript><img" in text
     assert "checked" not in text.partition("<script>")[0].partition('type="checkbox"')[2][:30]
 
 

@@ -36,7 +36,7 @@ _PAGE = """
 {player}
 <div class="turn">{inputs}</div>
 <p><output class="said" aria-live="polite">{said}</output><br>
-<small>Runs here: these settings were computed beforehand.</small></p>
+<small>Computed beforehand: these settings, and no others.</small></p>
 {caption}
 <script>
 (() => {{
