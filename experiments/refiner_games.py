@@ -40,6 +40,7 @@ PAPER = replace(
     discriminator_width=OURS.discriminator_width,
 )  # fmt: skip
 ONE_TURN = {"turns": 1, "steps": OURS.steps - 74, "validate_every": 20}
+RATES = {"refiner_rate": OURS.refiner_rate, "discriminator_rate": OURS.discriminator_rate}
 # Nothing but lambda holds the root: its steps are corrected, not its place, and changes are free.
 FREE = replace(OURS, reach=0.0, change_weight=0.0)
 SECONDS = 5.0  # of the walk that every refiner refines
@@ -66,6 +67,9 @@ ROWS = {
     "paper with instance noise": Row(PAPER, {"instance_noise": 0.5}),
     "paper with spectral norm": Row(PAPER, {"spectral": True}),
     "paper with less steepness": Row(PAPER, {"steepness_weight": 0.3}),
+    "paper with slow feet enlarged": Row(PAPER, {"slow": OURS.slow}),
+    "paper with our rates": Row(PAPER, RATES),
+    "paper with both": Row(replace(PAPER, slow=OURS.slow), RATES),
     "ours": Row(OURS, {}, SEEDS),
     "ours, may be steep": Row(OURS, {"steepness_weight": 0.0}),
     "ours, sees whole windows": Row(OURS, {"piece": 0}),
