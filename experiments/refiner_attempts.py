@@ -3,7 +3,7 @@
     python experiments/refiner_attempts.py [--list]
 
 All refine `lstm-gmm-contacts`, with seed 0, and are judged on validation clips as the refiners that
-ship were. Each is kept in runs/attempts/: stopped and started again, it goes on.
+ship were; besides, by the jerk of what goes on from runs among these. Each is kept in runs/attempts/: stopped and started again, it goes on.
 """
 
 from __future__ import annotations
@@ -11,17 +11,25 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from statistics import fmean
 
 import record
+import torch
+from refined_samples import clips_of, samples
+from torch import Tensor
 
 import motionlab
+from motionlab import metrics
 from motionlab.training import GAMES, Prepared
 from motionlab.training.adversarial import train_game
+from motionlab.training.checkpoints import load_weights
 from motionlab.training.judging import JUDGED, Judge, choose
 
 FOLDER = Path("runs/attempts")
+RUNS = "jerk of runs (m/s³)"
 GENERATOR, MODEL = "lstm-gmm-contacts", "refiner-contacts"
 ATTEMPTS = {
     "as it ships": {},
@@ -45,8 +53,15 @@ def main(arguments: list[str] | None = None) -> None:
         return
     generator, data = motionlab.load(GENERATOR), Prepared.find(chosen.data)
     judge = Judge(generator, data)
-    rows = {name: play(generator, data, judge, name) for name in ATTEMPTS}
-    result = {"generator": GENERATOR, "real": judge.real, "unrefined": judge.unrefined}
+    clips = clips_of(data, "run", "val")
+    with torch.no_grad():
+        runs = samples(generator, clips, len(clips), seed=0)
+    rows = {name: play(generator, data, judge, runs, name) for name in ATTEMPTS}
+    result = {
+        "generator": GENERATOR,
+        "real": judge.real | {RUNS: jerk(generator, clips)},
+        "unrefined": judge.unrefined | {RUNS: jerk(generator, runs)},
+    }
     record.write(record.provenance(begin, 0, data) | result | {"rows": rows}, chosen.output)
 
 
@@ -54,21 +69,29 @@ def folder_of(name: str) -> Path:
     return FOLDER / name.replace(" ", "-")
 
 
-def play(generator, data: Prepared, judge: Judge, name: str) -> dict:
+def jerk(generator, motions: Iterable[Tensor]) -> float:
+    """Mean jerk (m/s³) of features (frames, dim)."""
+    points = map(generator.encoding.positions, motions)
+    return fmean(metrics.jerk(its, generator.fps).mean().item() for its in points)
+
+
+def play(generator, data: Prepared, judge: Judge, runs: Tensor, name: str) -> dict:
     """A game from beginning to end: what was changed, the refiner chosen of it, and all of them."""
     folder = folder_of(name)
     preset = replace(GAMES[MODEL]["ship"], seed=0, **ATTEMPTS[name])
     curve = train_game(generator, data, preset, folder, name=MODEL, device="cpu")
     if not (folder / JUDGED).exists():
         choose(folder, judge)
-    rows = json.loads((folder / JUDGED).read_text(encoding="utf-8"))["refined"]
-    chosen = min(rows, key=lambda row: row["score"] if row["score"] is not None else float("inf"))
+    refiner, about = load_weights(folder / preset.weights)
+    with torch.no_grad():
+        refined = refiner.eval()(runs)
+    chosen = about["judged"]
     print(name, chosen, flush=True)
     return {
         "changes": ATTEMPTS[name],
         "minutes": curve[-1]["seconds"] / 60,
-        "chosen": chosen,
-        "by step": rows,
+        "chosen": chosen | {RUNS: jerk(generator, refined)},
+        "by step": json.loads((folder / JUDGED).read_text(encoding="utf-8"))["refined"],
     }
 
 

@@ -2,8 +2,9 @@
 
     python experiments/refiner_games.py [--list] [--share 1/2]
 
-The paper's game and ours, whole with three seeds and without each of their tricks with one, all with
-as many updates of the refiner. Each is kept in runs/games/: stopped and started again, it goes on.
+The paper's game and ours, whole with three seeds, and with one without each of their tricks, with
+others' remedies and some of our own, and under root terms of some weights. All have as many updates
+of the refiner. Each is kept in runs/games/: stopped and started again, it goes on.
 One walk, refined by each, lies in results/refiner_walks.json, to be looked at.
 """
 

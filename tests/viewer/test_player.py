@@ -20,8 +20,9 @@ from motionlab import Motion, MotionLabError, Skeleton
 from motionlab.datasets import gaits
 from motionlab.viewer import palette
 from motionlab.viewer.body import body
+from motionlab.viewer.figure import PageFigure
 from motionlab.viewer.player import SHOWN_FPS, Player, Track, in_few_bytes, payload, quantise
-from motionlab.viewer.show import PagePlayer, show
+from motionlab.viewer.show import show
 
 CANONICAL = Skeleton.canonical()
 MOTION_JS = Path(__file__).resolve().parents[2] / "web" / "src" / "motion.js"
@@ -180,7 +181,7 @@ def test_a_book_page_gets_html_and_no_widget_state(monkeypatch):
     monkeypatch.setenv("MOTIONLAB_VIEWER", "page")
     before = set(Widget.get_manager_state()["state"])
     shown = show(standing(), labels="</script><b>", caption="a < b")
-    assert isinstance(shown, PagePlayer)
+    assert isinstance(shown, PageFigure)
     assert set(Widget.get_manager_state()["state"]) == before
     data = re.search(
         r'<script type="application/json">(.*?)</script>', shown.html, re.DOTALL

@@ -103,7 +103,7 @@ class Sample:
                 f"{name} refines features of another kind than {self.model}'s: with contacts or "
                 "without, as angles or not, of another body or frame rate."
             )
-        made_for = refiner.about.get("generator_hash", refiner.about.get("generator"))
+        made_for = refiner.about.get("generator_hash")
         if made_for not in (None, model.hash):
             print(f"{name} learned to correct motion of another generator than {self.model}; it may "
                   "help less, and its licence holds as well", flush=True)  # fmt: skip

@@ -119,7 +119,7 @@ def train_game(
         alpha=preset.decay,
     )
     facts = {"name": name, "preset": asdict(preset), "data": data.hash,
-             "generator": getattr(generator, "hash", None),  # sha256, if it was loaded
+             "generator_hash": getattr(generator, "hash", None),  # if it was loaded
              "model": game.refiner.config(), "step": 0, "seconds": 0.0, "curve": []}  # fmt: skip
     _resume(folder / CHECKPOINT, game, optimizer, facts)
     source = _Source(generator, data, preset, device)
@@ -285,7 +285,7 @@ def _resume(path: Path, game: Game, optimizer, facts: dict) -> None:
     if not path.exists():
         return
     tensors, found = read_checkpoint(path)
-    same = ("name", "data", "generator", "model")
+    same = ("name", "data", "generator_hash", "model")
     before, now = dict(found.get("preset", {})), dict(facts["preset"])
     other = [key for key in same if found.get(key, facts[key]) != facts[key]]
     other += [key for key in now if key != "steps" and before.get(key) != now[key]]

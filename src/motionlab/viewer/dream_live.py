@@ -19,8 +19,8 @@ from .player import Player, payload
 
 SECONDS = Control("seconds", "Seconds", "How long the motion is", 1, 60, 1, 10)
 # Room for the longest label in JupyterLab's letters; else it is cut off.
-_STYLE = {"description_width": "170px"}
-_LAYOUT = ipywidgets.Layout(width="440px")
+STYLE = {"description_width": "170px"}
+LAYOUT = ipywidgets.Layout(width="440px")
 
 
 def controls(
@@ -65,8 +65,8 @@ def controls(
 def _field(control: Control, value: float, starts: Sequence[str]) -> ipywidgets.DOMWidget:
     """The widget for one control. A slider counts when it is let go: in between it would only make
     the kernel sample what nobody looks at."""
-    common = {"description": control.label, "tooltip": control.help, "style": _STYLE,
-              "layout": _LAYOUT}  # fmt: skip
+    common = {"description": control.label, "tooltip": control.help, "style": STYLE,
+              "layout": LAYOUT}  # fmt: skip
     if control.name == "start":
         options = [(name, index) for index, name in enumerate(starts)]
         return ipywidgets.Dropdown(options=options, value=int(value), **common)

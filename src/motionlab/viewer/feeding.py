@@ -12,6 +12,7 @@ import uuid
 
 from ..errors import ViewerError
 from . import palette
+from .figure import PageFigure
 
 _FRAMES, _MOST = 60, 20
 
@@ -53,19 +54,9 @@ _PAGE = """
 """
 
 
-class Feeding:
-    """A figure for a notebook or a page."""
-
-    def __init__(self, page: str) -> None:
-        self.html = page
-
-    def _repr_html_(self) -> str:
-        return self.html
-
-
 def feeding(
     real: int = 5, fed: int = 5, *, fps: float = 30.0, caption: str | None = None
-) -> Feeding:
+) -> PageFigure:
     """The pattern of auto-conditioned training (acLSTM, figure 1), under sliders for u and v.
 
     Parameters
@@ -81,7 +72,7 @@ def feeding(
     if not (isinstance(real, int) and isinstance(fed, int) and real >= 1 and fed >= 0):
         raise ViewerError(f"feeding: u is {real!r}, v {fed!r}; u must be 1 or more, v 0 or more.")
     recorded = [t % (real + fed) < real for t in range(_FRAMES)]
-    return Feeding(
+    return PageFigure(
         _PAGE.format(
             key=f"feeding-{uuid.uuid4().hex[:8]}",
             recorded=palette.COLORS["mocap"],

@@ -19,6 +19,7 @@ from typing import Any
 
 from ..errors import ViewerError
 from ..motion import Motion
+from .figure import PageFigure
 from .palette import check_color
 from .player import Track, page_html, payload
 from .show import still_picture, trail_points
@@ -57,16 +58,6 @@ _PAGE = """
 </script>
 </div>
 """
-
-
-class Knobs:
-    """The figure of a page."""
-
-    def __init__(self, page: str) -> None:
-        self.html = page
-
-    def _repr_html_(self) -> str:
-        return self.html
 
 
 def knobs(
@@ -119,7 +110,7 @@ def knobs(
     return box(make, values, start, called, caption, **look)
 
 
-def _page(make, values, start, called, caption, trail, color, height) -> Knobs:
+def _page(make, values, start, called, caption, trail, color, height) -> PageFigure:
     counts = [range(len(some)) for some in values.values()]
     if (settings := math.prod(map(len, counts))) > MOST:
         raise ViewerError(f"knobs: {settings} settings are too many for a page ({MOST}).")
@@ -140,7 +131,7 @@ def _page(make, values, start, called, caption, trail, color, height) -> Knobs:
         autoplay=True, choose="setting", chosen=chosen,
     )  # fmt: skip
     names = [[f"{value:g}" for value in some] for some in values.values()]
-    return Knobs(
+    return PageFigure(
         _PAGE.format(
             key=f"knobs-{uuid.uuid4().hex[:8]}",
             player=page_html(content, still_picture(tracks[chosen])),

@@ -9,6 +9,7 @@ from typing import Any
 import ipywidgets
 
 from ..errors import MotionLabError
+from .dream_live import LAYOUT, STYLE
 from .knobs import is_box, made_of
 from .player import Player, payload
 from .show import trail_points
@@ -53,8 +54,7 @@ def box(
 
 def _field(label: str, some: Sequence[float], value: float) -> ipywidgets.DOMWidget:
     """A box to tick, or a slider, which counts when it is let go."""
-    layout = ipywidgets.Layout(width="440px")
-    common = {"description": label, "style": {"description_width": "170px"}, "layout": layout}
+    common = {"description": label, "style": STYLE, "layout": LAYOUT}
     if is_box(some):
         return ipywidgets.Checkbox(value=value, **common)
     step = 10.0 ** math.floor(math.log10((some[-1] - some[0]) / 20))

@@ -16,20 +16,11 @@ from torch import Tensor
 from ..errors import ViewerError
 from ..motion import Motion
 from ..skeleton import Skeleton
+from .figure import PageFigure
 from .palette import PATH, check_color, color
 from .player import Player, Track, page_html, payload
 
 MOST_TRACKS = 12
-
-
-class PagePlayer:
-    """The player of a built page: plain HTML, no kernel and no widget state."""
-
-    def __init__(self, html: str):
-        self.html = html
-
-    def _repr_html_(self) -> str:
-        return self.html
 
 
 def show(
@@ -48,7 +39,7 @@ def show(
     fps: float | None = None,
     colors: str | Sequence[str] | None = None,
     autoplay: bool = True,
-) -> Player | PagePlayer:
+) -> Player | PageFigure:
     """Play one motion, or several side by side or in one picture, on one clock.
 
     Parameters
@@ -103,7 +94,7 @@ def show(
         **({} if choose is None else {"choose": str(choose), "chosen": int(chosen)}),
     )
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
-        return PagePlayer(page_html(data, still_picture(tracks[0]), caption))
+        return PageFigure(page_html(data, still_picture(tracks[0]), caption))
     return Player(data, caption=caption or "")
 
 
