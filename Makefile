@@ -28,7 +28,7 @@ lint: $(environment)
 	$(python) -m nbstripout --verify $(wildcard notebooks/*.ipynb)
 
 clean:
-	rm -rf book/_build book/vendor book/node_modules web/node_modules src/motionlab/viewer/static
+	rm -rf book/_build book/vendor book/node_modules web/node_modules src/motionlab/viewer/live/static
 	rm -rf .venv .pytest_cache .ruff_cache .hypothesis
 
 .venv/requirements: requirements-lock.txt

@@ -22,7 +22,7 @@ class PlayerBuildHook(BuildHookInterface):
     def initialize(self, version: str, build_data: dict) -> None:
         """Called by hatchling before it collects files, for wheels, editable installs and sdists."""
         web = Path(self.root) / "web"
-        static = Path(self.root) / "src" / "motionlab" / "viewer" / "static"
+        static = Path(self.root) / "src" / "motionlab" / "viewer" / "live" / "static"
         outputs = [static / name for name in OUTPUTS]
         if self.target_name == "sdist" or _fresh(web, outputs):
             return
@@ -36,7 +36,7 @@ class PlayerBuildHook(BuildHookInterface):
 
     def clean(self, versions: list[str]) -> None:
         """Called by ``hatch clean``: remove what the hook made."""
-        static = Path(self.root) / "src" / "motionlab" / "viewer" / "static"
+        static = Path(self.root) / "src" / "motionlab" / "viewer" / "live" / "static"
         for folder in (static, Path(self.root) / "web" / "node_modules"):
             shutil.rmtree(folder, ignore_errors=True)
 

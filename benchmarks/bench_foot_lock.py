@@ -14,7 +14,7 @@ import tyro
 from interleaved import medians, save, table, verdict
 
 import motionlab
-from motionlab.solvers.foot_lock import lock
+from motionlab.feet.lock import lock
 
 SECONDS = 10
 LIMITS = {"one clip (s)": 2.0, "batch / loop": 1 / 5}

@@ -17,7 +17,7 @@ import tyro
 from interleaved import medians, save, table, verdict
 
 from motionlab import Motion
-from motionlab.datasets import files, locomotion, registry
+from motionlab.datasets import files, loader, locomotion, registry
 from motionlab.io.bvh import parse_bvh
 
 LIMIT = 15 * 60  # seconds for all clips
@@ -46,11 +46,13 @@ def main(options: Options) -> None:
         sample = clips[:: options.every]
         contents = [(clip, data) for clip, data in files.read(sample)]
         motions = [read(clip, data) for clip, data in contents]
-        locomotion.bring(motions[0])  # reads the reference
+        stance = loader.stance(source)
         seconds = medians(
             {
                 "reading": lambda c=contents: [read(clip, data) for clip, data in c],
-                "retargeting": lambda m=motions: [locomotion.bring(motion) for motion in m],
+                "retargeting": lambda m=motions, s=stance: [
+                    locomotion.bring(motion, s) for motion in m
+                ],
             },
             options.rounds,
         )

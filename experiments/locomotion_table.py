@@ -31,7 +31,7 @@ import motionlab
 from motionlab import Motion, contacts, datasets
 from motionlab.datasets import registry
 from motionlab.metrics import feet, gait
-from motionlab.rest_alignment import rest_points
+from motionlab.retargeting.rest_alignment import rest_points
 from motionlab.skeleton import SIDES, Skeleton
 
 RESULT = Path(__file__).parents[1] / "results/locomotion.json"

@@ -14,7 +14,7 @@ from contact_likelihood import a_frame
 
 import motionlab
 from motionlab.training import Prepared
-from motionlab.viewer.network_weights import as_in_browser, weights_script
+from motionlab.viewer.live.network_weights import as_in_browser, weights_script
 from motionlab.weights import find
 
 MODELS = ("lstm-gmm", "lstm-gmm-contacts")

@@ -1,6 +1,7 @@
 """The files around the code say what is true: environment, lock, map, reference, imports."""
 
 import ast
+import graphlib
 import importlib.util
 import json
 import re
@@ -86,38 +87,96 @@ def test_map_in_contributing_is_the_tree():
     assert inner == {f[2] for f in folders if f[:2] == ("src", "motionlab") and len(f) > 3}
 
 
+def module_of(path: Path) -> str:
+    """The dotted name of a file, without `motionlab.`; a package's own is its folder's."""
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+# Methods that hand over to what stands to the right of them, and import it when they are called.
+HAND_OVER = {("motion", "retargeting")}  # Motion.retarget
+
+
+def import_statements(tree: ast.AST):
+    """Those that run, also in functions, each with what it stands in: not those for type checkers."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node
+        yield from import_statements(node)
+
+
+def imports_of(path: Path) -> set[str]:
+    """Modules of motionlab that a file imports, now or later, dotted, without `motionlab.`"""
+    package = ["motionlab", *path.relative_to(PACKAGE).parent.parts]
+    found = set()
+    for node in import_statements(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+            continue
+        base = package[: len(package) + 1 - node.level] if node.level else []
+        module = ".".join([*base, *([node.module] if node.module else [])])
+        names = {alias.name: f"{module}.{alias.name}" for alias in node.names}
+        inner = {name for name in names.values() if name.removeprefix("motionlab.") in MODULES}
+        found |= inner | ({module} if len(inner) < len(names) else set())
+    ours = {module for module in found if module.split(".")[0] == "motionlab"}
+    return {module.removeprefix("motionlab").lstrip(".") for module in ours}
+
+
 def group_of(module: str) -> int | None:
     """Which group of the line a dotted module (without `motionlab.`) belongs to."""
     return next((i for i, names in enumerate(GROUPS) if module.split(".")[0] in names), None)
 
 
-def imports_of(path: Path) -> set[str]:
-    """Modules of motionlab that a file imports when it is loaded, dotted, without `motionlab.`"""
-    package = ["motionlab", *path.relative_to(PACKAGE).parent.parts]
-    found = set()
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] if node.level else []
-            module = ".".join([*base, *([node.module] if node.module else [])])
-            found |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
-    return {m.removeprefix("motionlab.") for m in found if m.startswith("motionlab.")}
+def test_the_line_of_imports_names_every_room():
+    outside = {"", "__main__", "errors", "version"}  # the package itself, and what all may use
+    assert {m for m in MODULES if group_of(m) is None} == outside
+    rooms = {m.split(".")[0] for m in MODULES}
+    promised = {"losses", "studies"}  # rooms of chapters to come
+    elsewhere = {"experiments", "notebooks"}
+    assert set().union(*GROUPS) - promised - elsewhere <= rooms
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.stem)
-def test_imports_point_left(path):
-    own = group_of(".".join(path.relative_to(PACKAGE).with_suffix("").parts))
-    if own is None:  # __init__, __main__, errors: outside the line
-        return
-    for module in imports_of(path):
-        theirs = group_of(module)
-        assert theirs is None or theirs <= own, f"{path.name} imports motionlab.{module}"
+@pytest.mark.parametrize("module", [m for m in MODULES if group_of(m) is not None])
+def test_imports_point_left(module):
+    for other in imports_of(MODULES[module]):
+        theirs = group_of(other)
+        if theirs is not None and (module, other.split(".")[0]) not in HAND_OVER:
+            assert theirs <= group_of(module), f"{module} imports motionlab.{other}"
+
+
+def test_no_circle_of_modules():
+    graph = {module: imports_of(path) - {module} for module, path in MODULES.items()}
+    assert not [m for m in graph if m != "__main__" and "" in graph[m]], (
+        "ask a module, not motionlab"
+    )
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(" -> ".join(f"motionlab.{module}" for module in reversed(error.args[1])))
+
+
+def test_a_circle_is_seen(tmp_path, monkeypatch):
+    """Also one that is closed inside a function; not one of types alone."""
+    monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
+    (tmp_path / "a.py").write_text("def f():\n    from .b import g\n")
+    (tmp_path / "b.py").write_text(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from .a import f\n"
+    )
+    monkeypatch.setitem(
+        globals(), "MODULES", {name: tmp_path / f"{name}.py" for name in ("a", "b")}
+    )
+    test_no_circle_of_modules()
+    (tmp_path / "b.py").write_text("from motionlab import a\n")
+    with pytest.raises(pytest.fail.Exception, match=r"motionlab\.a"):
+        test_no_circle_of_modules()
 
 
 def public_modules() -> set[str]:
-    modules = {p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py")}
-    return {".".join(m.parts) for m in modules if not m.name.startswith("_")}
+    packages = {m for m, path in MODULES.items() if path.stem.startswith("_")}
+    return set(MODULES) - packages
 
 
 def test_reference_names_every_public_module():

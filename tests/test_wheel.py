@@ -14,10 +14,10 @@ READ_WHEN_IT_RUNS = {
     "motionlab/encodings/mean_pose.json",
     "motionlab/datasets/gaits.json",
     "motionlab/datasets/sources.toml",
-    "motionlab/viewer/scene.html",
-    "motionlab/viewer/static/player.js",
-    "motionlab/viewer/static/widget.js",
-    "motionlab/viewer/style.mplstyle",
+    "motionlab/viewer/live/scene.html",
+    "motionlab/viewer/live/static/player.js",
+    "motionlab/viewer/live/static/widget.js",
+    "motionlab/viewer/pictures/style.mplstyle",
 } | {
     f"motionlab/weights/{path.name}"
     for kind in ("*.safetensors", "*.md")

@@ -17,6 +17,6 @@ const common = {
 };
 
 for (const [entry, format, file] of [["page", "iife", "player"], ["widget", "esm", "widget"]]) {
-  const outfile = at(`../src/motionlab/viewer/static/${file}.js`);
+  const outfile = at(`../src/motionlab/viewer/live/static/${file}.js`);
   await build({ ...common, entryPoints: [at(`src/${entry}.js`)], format, outfile });
 }

@@ -7,7 +7,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 from motionlab.viewer import bundle_path
-from motionlab.viewer.scene_page import write_viewer
+from motionlab.viewer.live.scene_page import write_viewer
 
 CHAPTER_SECONDS = 150
 

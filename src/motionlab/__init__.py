@@ -6,8 +6,7 @@ from .io.gltf import write_gltf
 from .kinematics import forward_kinematics
 from .motion import Motion, concatenate
 from .skeleton import Skeleton
-
-__version__ = "0.1.0"
+from .version import __version__ as __version__
 
 __all__ = [
     "Motion",

@@ -142,7 +142,7 @@ class Version:
 
         import torch
 
-        from . import __version__
+        from .version import __version__
 
         print(f"motionlab {__version__}, torch {torch.__version__}, Python {sys.version.split()[0]}, "
               f"{platform.platform()}")  # fmt: skip

@@ -232,8 +232,8 @@ class Motion:
     def retarget(
         self, skeleton: Skeleton | None = None, *, reference: Motion | None = None
     ) -> Motion:
-        """The motion on another skeleton (None: the canonical one), see `motionlab.retarget`."""
-        from .retarget import retarget
+        """The motion on another skeleton (None: the canonical one), see `motionlab.retargeting`."""
+        from .retargeting import retarget
 
         return retarget(self, skeleton, reference=reference)
 

@@ -174,6 +174,18 @@ class Skeleton:
                 found.pop("spine", None)
         return dict(sorted(found.items(), key=lambda item: item[1]))
 
+    def below(self, role: str, child: str) -> Tensor | None:
+        """Where a joint that hangs on another, at any depth, is in its frame, (3,) metres.
+
+        Both by their roles; joints between, such as those that spread a twist, are as at rest. None
+        if it does not hang there.
+        """
+        start, end = self.roles[role], self.roles.get(child, -1)
+        offset = torch.zeros(3)
+        while end > start:
+            offset, end = offset + self.offsets[end], self.parents[end]
+        return offset if end == start else None
+
     @cached_property
     def mirror_partners(self) -> tuple[int, ...]:
         """For each joint the joint on the other side of the body, itself if it is central."""

@@ -11,9 +11,9 @@ from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
 from motionlab.encodings import JointAngles, Normalizer, RootRelative
 from motionlab.models import AcLstm, LstmGmm
-from motionlab.viewer.dream import Dream, page_figure
-from motionlab.viewer.network_weights import as_in_browser, weights_script
-from motionlab.viewer.player import bundle_path
+from motionlab.viewer.live.dream_page import Dream, page_figure
+from motionlab.viewer.live.network_weights import as_in_browser, weights_script
+from motionlab.viewer.live.player import bundle_path
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

@@ -11,9 +11,9 @@ import pytest
 import torch
 
 from motionlab import Motion, Skeleton
-from motionlab.viewer.knobs import knobs
-from motionlab.viewer.player import bundle_path
-from motionlab.viewer.show import show
+from motionlab.viewer.live.knobs import knobs
+from motionlab.viewer.live.player import bundle_path
+from motionlab.viewer.live.show import show
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

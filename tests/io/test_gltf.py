@@ -20,8 +20,8 @@ from motionlab import Motion, MotionLabError, Skeleton, datasets, write_gltf
 from motionlab.errors import GltfError, MotionError, ViewerError
 from motionlab.io.bvh import parse_bvh
 from motionlab.kinematics import yaw_matrix
-from motionlab.rest_alignment import stands
-from motionlab.viewer.body import body
+from motionlab.retargeting.rest_alignment import stands
+from motionlab.viewer.pictures.body import body
 
 VALIDATE = Path(__file__).with_name("gltf_in_node.mjs")
 VALIDATOR = Path(__file__).parents[2] / "web" / "node_modules" / "gltf-validator"

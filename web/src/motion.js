@@ -1,4 +1,4 @@
-// The payload written by motionlab/viewer/player.py, read back: where every point is at any time.
+// The payload written by motionlab/viewer/live/player.py, read back: where every point is at any time.
 
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 const ROOT_UNIT = 1e-4; // metres

@@ -42,10 +42,11 @@ class Evaluate:
     """File for the numbers, as JSON."""
 
     def run(self) -> None:
-        from .. import __version__, load
         from ..training import Prepared
         from ..training.checkpoints import write_whole
         from ..training.evaluation import evaluate
+        from ..version import __version__
+        from ..weights import load
 
         begin = time.perf_counter()
         check_seed(self.seed)

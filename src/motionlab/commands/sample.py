@@ -53,7 +53,8 @@ class Sample:
     def run(self) -> None:
         import torch
 
-        from .. import load, write_bvh
+        from ..io import write_bvh
+        from ..weights import load
 
         model = load(self.model)
         check_generates(model, self.model)
@@ -88,8 +89,8 @@ class Sample:
 
     def _refiner(self, model: nn.Module) -> nn.Module | None:
         """What corrects motion of a model, if that is wanted."""
-        from .. import load
         from ..models import Refiner
+        from ..weights import load
 
         if not self.refine and self.refiner is None:
             return None
@@ -150,8 +151,8 @@ class Sample:
 
 def locked(motion: Motion) -> Motion:
     """The motion with its toes held still on the level where they rest."""
-    from ..contacts import label
-    from ..solvers import lock_feet
+    from ..feet.contacts import label
+    from ..feet.lock import lock_feet
 
     found = label(motion) if motion.contacts is None else motion.contacts
     return lock_feet(motion, found, floor=None)

@@ -92,10 +92,10 @@ class Train:
               + "".join(f"; {key} {value:g}" for key, value in sampling.items()))  # fmt: skip
 
     def _play(self, preset: GamePreset, out: Path) -> None:
-        from .. import load
         from ..training import Prepared
         from ..training.adversarial import train_game
         from ..training.judging import Judge, choose
+        from ..weights import load
 
         if self.learning_rate is not None or (self.devices, self.nodes) != (1, 1):
             raise MotionLabError(

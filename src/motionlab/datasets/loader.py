@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 import warnings
@@ -16,7 +17,7 @@ from tqdm import tqdm
 from ..errors import BvhError, DataError
 from ..io.bvh import parse_bvh, read_bvh
 from ..motion import Motion
-from . import cache, files
+from . import cache, files, locomotion
 from .registry import (
     EXAMPLES,
     GAITS,
@@ -122,9 +123,18 @@ def _process(name: str, download: bool | None) -> tuple[int, Callable[[Motion], 
     """What is done to clips after reading: its number, for the cache, and a function."""
     if name != LOCOMOTION:
         return 0, lambda motion: motion
-    from . import locomotion
+    return locomotion.FORMAT, lambda motion: locomotion.bring(
+        motion, stance(motion.source, download)
+    )
 
-    return locomotion.FORMAT, lambda motion: locomotion.bring(motion, download)
+
+@functools.cache
+def stance(source: str, download: bool | None = None) -> Motion | None:
+    """The motion by which `locomotion` knows how a source's rig stands; None if its rest pose does."""
+    if source not in locomotion.STANCES:
+        return None
+    name, frames = locomotion.STANCES[source]
+    return load(source, clips=[name], download=download)[0][:frames]
 
 
 def _cached_together(name: str) -> dict[str, list[Clip]]:

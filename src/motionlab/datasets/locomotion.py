@@ -11,10 +11,8 @@ retargeted to `Skeleton.canonical`. They keep their names, splits and licences. 
 
 from __future__ import annotations
 
-from functools import cache
-
 from ..motion import Motion
-from ..retarget import retarget
+from ..retargeting import retarget
 from .registry import LOCOMOTION_FPS
 
 # Raise this when retargeting changes, so that cached results are made anew.
@@ -24,15 +22,6 @@ FORMAT = 4
 STANCES = {"accad": ("Male1_B1_StandToWalk", 30)}
 
 
-def bring(motion: Motion, download: bool | None = None) -> Motion:
-    """One clip of a source to the canonical skeleton."""
-    reference = _stance(motion.source, download) if motion.source in STANCES else None
-    return retarget(motion.resample(LOCOMOTION_FPS), reference=reference)
-
-
-@cache
-def _stance(source: str, download: bool | None) -> Motion:
-    from .loader import load
-
-    name, frames = STANCES[source]
-    return load(source, clips=[name], download=download)[0][:frames]
+def bring(motion: Motion, stance: Motion | None = None) -> Motion:
+    """One clip of a source to the canonical skeleton, by the stance of its source if it needs one."""
+    return retarget(motion.resample(LOCOMOTION_FPS), reference=stance)

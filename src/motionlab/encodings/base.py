@@ -9,8 +9,8 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from .. import contacts
 from ..errors import EncodingError
+from ..feet import contacts
 from ..ik import solve
 from ..motion import Motion
 from ..skeleton import Skeleton

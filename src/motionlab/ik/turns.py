@@ -34,6 +34,19 @@ def swing(a: Tensor, b: Tensor) -> Tensor:
     return torch.eye(3).to(a) + across + across @ across / (1 + cosine).clamp(min=1e-12)
 
 
+def shortest_turn(start: Tensor, end: Tensor) -> Tensor:
+    """Smallest rotations (..., 3, 3) that turn one direction (..., 3) into another; both broadcast.
+
+    `swing` by way of two half turns: precise also near opposite directions, where `swing` divides
+    by little. Exactly there it is none.
+    """
+    start, end = torch.broadcast_tensors(unit(start), unit(end))
+    middle = unit(start + end)
+    # Two half turns, about the start and about the middle, make one of twice the angle between.
+    half = lambda v: 2 * v[..., :, None] * v[..., None, :] - torch.eye(3).to(v)
+    return half(middle) @ half(start)
+
+
 def turn_about(axis: Tensor, angle: Tensor) -> Tensor:
     """Rotation (..., 3, 3) by an angle (...) in radians about a unit axis (..., 3)."""
     return roma.rotvec_to_rotmat(axis * angle[..., None])

@@ -20,6 +20,7 @@ from torch import Tensor
 
 from ..errors import GltfError
 from ..motion import Motion
+from ..version import __version__
 from .gltf_mesh import Skin, bind_pose, mannequin
 
 # Codes that glTF took from OpenGL.
@@ -84,8 +85,6 @@ class _Scene:
     `buffer`, the arrays that some of them are about."""
 
     def __init__(self, motion: Motion, name: str):
-        from .. import __version__
-
         self.motion, self.name = motion, name
         self.bound = bind_pose(motion)
         self.buffer = bytearray()
@@ -228,7 +227,7 @@ def _linear(color: str) -> list[float]:
     """Red, green, blue and opacity, 0 to 1, as light adds up: colours as written (sRGB) do not."""
     from matplotlib.colors import to_rgb
 
-    from ..viewer.palette import check_color
+    from ..viewer.pictures.palette import check_color
 
     rgb = np.array(to_rgb(check_color(color)))
     rgb = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)

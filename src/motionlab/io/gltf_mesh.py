@@ -16,7 +16,7 @@ import torch
 
 from ..kinematics import heading, yaw_matrix
 from ..motion import Motion
-from ..rest_alignment import stands
+from ..retargeting.rest_alignment import stands
 from ..skeleton import SIDES, Skeleton
 
 INFLUENCES = 4  # joints that may carry a vertex, as many as every program reads
@@ -55,8 +55,8 @@ def bind_pose(motion: Motion) -> Motion:
 def mannequin(bound: Motion) -> Skin | None:
     """Dress a body in its bind pose, one frame; None if no bone has a length."""
     # Not at the top: the viewer brings its widgets along, and this module is loaded with the package.
-    from ..viewer.body import body
-    from ..viewer.picture import Figure, capsules
+    from ..viewer.pictures.body import body
+    from ..viewer.pictures.picture import Figure, capsules
 
     dress = body(bound.skeleton)
     if not dress.bones:

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from ..contacts import foot_points, rest_heights
 from ..errors import MetricError
+from ..feet.contacts import foot_points, rest_heights
 from ..skeleton import Skeleton
 from .checks import check_contacts, check_frames, check_positive, check_rate, check_skeleton
 

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..contacts import foot_points, velocities
+from ..feet.contacts import foot_points, velocities
 from ..skeleton import SIDES, Skeleton
 from .checks import check_contacts, check_positions, check_positive, check_rate, check_skeleton
 

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from .. import Skeleton, contacts, metrics
+from .. import metrics
 from ..encodings import Encoding
 from ..errors import TrainingError
+from ..feet import contacts
 from ..metrics import Interval, Limits
+from ..skeleton import Skeleton
 from .prepared import SPLITS, Prepared
 
 MOST = 5_000_000  # frames of all samples: what fits in memory

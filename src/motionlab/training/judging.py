@@ -17,9 +17,10 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from .. import contacts, metrics
+from .. import metrics
 from ..encodings import JointAngles, from_config
 from ..errors import TrainingError
+from ..feet import contacts
 from ..models import Discriminator
 from ..models.refiner import effector_normalizer, telling_loss
 from .checkpoints import load_weights, save_weights, write_whole

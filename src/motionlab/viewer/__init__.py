@@ -2,15 +2,18 @@
 
 from importlib import import_module
 
-from . import palette
-from .dream import dream
-from .feeding import feeding
-from .knobs import knobs
-from .player import Player, bundle_path
-from .show import show
+from .live.dream import dream
+from .live.feeding import feeding
+from .live.knobs import knobs
+from .live.player import Player, bundle_path
+from .live.show import show
+from .pictures import palette
 
 # Drawn by libraries that take their time to load: imported when first used.
-_STILLS = ("still", "filmstrip", "stack", "video")
+_LATER = {
+    **dict.fromkeys(("still", "filmstrip", "stack", "video"), ".pictures.stills"),
+    "scene": ".live.scene3d",
+}
 __all__ = [
     "Player",
     "bundle_path",
@@ -33,10 +36,8 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str):
-    if name in _STILLS:
-        return getattr(import_module(".stills", __name__), name)
+    if name in _LATER:
+        return getattr(import_module(_LATER[name], __name__), name)
     if name == "plots":
-        return import_module(".plots", __name__)
-    if name == "scene":
-        return import_module(".scene3d", __name__).scene
+        return import_module(".pictures.plots", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,7 +11,7 @@ const TELL_EVERY = 1000; // milliseconds
 const RESTARTS = ["start", "seed"]; // what can't change in the middle of a motion
 
 export class Dream {
-  /** `data` as motionlab/viewer/dream.py writes it; `still` is an image URL. */
+  /** `data` as motionlab/viewer/live/dream_page.py writes it; `still` is an image URL. */
   constructor(figure, { clips, live, controls, starts, facts }, still) {
     Object.assign(this, { figure, clips, live, still });
     addStyle(figure);

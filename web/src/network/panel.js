@@ -1,5 +1,5 @@
 // Sliders and what stands around them. What there is to set comes from Python (CONTROLS in
-// motionlab/viewer/dream.py), so that a notebook's widgets have the same names and ranges.
+// motionlab/viewer/live/dream_settings.py), so that a notebook's widgets have the same names and ranges.
 
 const make = (tag, className, text = "") => Object.assign(document.createElement(tag), { className, textContent: text });
 

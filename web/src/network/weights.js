@@ -1,4 +1,4 @@
-// The weights as motionlab/viewer/network_weights.py writes them, read back. They come as a script,
+// The weights as motionlab/viewer/live/network_weights.py writes them, read back. They come as a script,
 // because a page opened from disk may load scripts and nothing else.
 
 const SHELF = "motionlabWeights"; // where the scripts put what they bring

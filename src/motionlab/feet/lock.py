@@ -1,0 +1,328 @@
+"""Feet that rest where their contact labels say they do (RNN-GAN, section 5.1, post-processing).
+
+A toe that is in contact is held at one place of the floor, the leg is bent to reach it, and before
+and after each contact the foot eases from and to where it was. All clips of a batch, all frames and
+both feet are worked on at once.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+from torch.nn.functional import max_pool1d, pad
+
+from ..errors import ModelError
+from ..ik.limb import two_bone
+from ..ik.turns import shortest_turn
+from ..kinematics import forward_kinematics
+from ..motion import Motion
+from ..skeleton import Skeleton
+from .contacts import foot_points, rest_heights
+from .planting import off_the_floor, steps
+
+SIDES = ("left", "right")
+PARTS = ("upper_leg", "lower_leg", "foot", "toes")
+GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
+FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, whatever its label
+FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
+BLEND = 0.25  # seconds from a foot's own way to where it is held
+REACH = 0.97  # share of its length to which a leg may be stretched; near 1 knees snap
+NEAR = 0.04  # metres that a foot may be moved while its leg stays as straight as it was
+STRAIGHT = 0.02  # metres that a knee lies beside its leg; if less, the thigh says where it points
+SETTLE = 0.15  # seconds over which the body comes down if a leg is too short
+
+
+def lock_feet(
+    motion: Motion,
+    contacts: Tensor | None = None,
+    *,
+    floor: float | None = 0.0,
+    blend: float = BLEND,
+) -> Motion:
+    """The motion with its toes held still while they are in contact.
+
+    Parameters
+    ----------
+    motion : with feet, toes and legs that its skeleton names.
+    contacts : bool (frames, 2), left and right toe; or (frames, 4) as of a Motion, whose toes are
+        taken. None: the motion's own.
+    floor : height of the floor in metres. None: where toes lie while they are in contact.
+    blend : seconds over which a foot eases into a contact, and out of it.
+
+    Returns
+    -------
+    Motion : on the same skeleton; only legs, feet and the root's height differ. Nothing but the
+        floor is changed where there is no contact.
+
+    Raises
+    ------
+    ModelError : contacts of another shape or kind, or none, a blend or floor that is no number.
+    SkeletonError : the skeleton lacks a joint of a leg.
+    """
+    contacts = motion.contacts if contacts is None else contacts
+    if contacts is None:
+        raise ModelError(
+            "lock_feet: this motion has no contacts. Give them, as `motionlab.contacts.label` does."
+        )
+    place, rotations = lock(
+        motion.skeleton, motion.root_positions, motion.rotations, contacts, motion.fps,
+        floor=floor, blend=blend,
+    )  # fmt: skip
+    return replace(motion, root_positions=place, rotations=rotations)
+
+
+def lock(
+    skeleton: Skeleton,
+    root_positions: Tensor,
+    rotations: Tensor,
+    contacts: Tensor,
+    fps: float,
+    *,
+    floor: float | None = 0.0,
+    blend: float = BLEND,
+) -> tuple[Tensor, Tensor]:
+    """`lock_feet` for many motions of equal length at once.
+
+    Parameters
+    ----------
+    root_positions : (..., frames, 3) metres; rotations : (..., frames, joints, 3, 3), local.
+    contacts : bool (..., frames, 2) or (..., frames, 4).
+
+    Returns
+    -------
+    root_positions and rotations like those given.
+    """
+    contacts = _checked(contacts, root_positions, floor, blend, fps)
+    joints = _legs(skeleton)
+    points, world = _forward(skeleton, root_positions, rotations)
+    toes = points[..., joints["toes"], :]  # (..., frames, 2, 3)
+    held = _clean(contacts & (steps(toes) * fps < FASTEST), fps)
+    ground = _ground(toes, held, _toe_heights(skeleton).to(toes), floor)
+    for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
+        held = held & (_onto_places(toes, held, ground).norm(dim=-1) < FARTHEST)
+    shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
+    shift = _above(shift, points, joints, ground, skeleton)
+    ankle = points[..., joints["foot"], :] + shift
+
+    sunk = root_positions - _sink(points, ankle, joints, fps)
+    hips = points[..., joints["upper_leg"], :] + (sunk - root_positions)[..., None, :]
+    return sunk, _bent(skeleton, joints, points, world, rotations, hips, ankle, shift, ground)
+
+
+# -- where feet are to be ---------------------------------------------------------------------------
+
+
+def _clean(contacts: Tensor, fps: float) -> Tensor:
+    """Contacts (..., frames, 2) without gaps and flickers."""
+    gap, shortest = max(1, round(GAP * fps)), max(1, round(SHORTEST * fps))
+    return _opened(_closed(contacts, gap), shortest - 1)
+
+
+def _closed(marks: Tensor, most: int) -> Tensor:
+    """Gaps of at most so many frames between two marks filled, along the frames (..., frames, 2)."""
+    since, until = _distance(marks, before=True), _distance(marks, before=False)
+    return marks | (since + until - 1 <= most)
+
+
+def _opened(marks: Tensor, most: int) -> Tensor:
+    """Runs of at most so many marks taken away; those at the ends may go on beyond, and stay."""
+    return ~_closed(~marks, most)
+
+
+def _distance(marks: Tensor, before: bool) -> Tensor:
+    """Frames (..., frames, 2) from each frame to the last mark before it (or the next after it)."""
+    frames = torch.arange(marks.shape[-2], device=marks.device)[:, None]
+    if before:
+        last = torch.where(marks, frames, -marks.shape[-2] * 4).cummax(-2).values
+        return frames - last
+    following = torch.where(marks, frames, marks.shape[-2] * 5).flip(-2).cummin(-2).values.flip(-2)
+    return following - frames
+
+
+def _toe_heights(skeleton: Skeleton) -> Tensor:
+    """Heights (2,) of toe joints above the floor when a foot stands flat."""
+    heights = rest_heights(skeleton)
+    # many a rest pose hangs from a root at the origin: its lowest foot joint stands, then
+    return heights[[1, 3]] - heights.amin().clamp(max=0)
+
+
+def _ground(toes: Tensor, held: Tensor, rest: Tensor, floor: float | None) -> Tensor:
+    """Heights (..., 2) of resting toe joints: the plane of contact."""
+    if floor is not None:
+        return (rest + floor).expand(*toes.shape[:-3], 2)
+    heights = torch.where(held, toes[..., 1], torch.nan)
+    return torch.nan_to_num(heights.nanmedian(-2).values, nan=0.0)
+
+
+def _onto_places(toes: Tensor, held: Tensor, ground: Tensor) -> Tensor:
+    """How far toes are from their places (..., frames, 2, 3) while they are held, else 0.
+
+    A place is where a toe joint is on average over one contact, on the ground.
+    """
+    begins = held & ~torch.cat([torch.zeros_like(held[..., :1, :]), held[..., :-1, :]], dim=-2)
+    number = begins.long().cumsum(-2) * held  # which contact, from 1; 0 where there is none
+    index = number[..., None].expand_as(toes)
+    none = toes.new_zeros(*toes.shape[:-3], toes.shape[-3] + 1, 2, 3)
+    sums = none.scatter_add(-3, index, toes)
+    counts = none.scatter_add(-3, index, torch.ones_like(toes))
+    places = sums / counts.clamp(min=1)
+    places[..., 1] = ground[..., None, :]
+    return (places.gather(-3, index) - toes) * held[..., None]
+
+
+def _shift(onto: Tensor, held: Tensor, blend: float) -> Tensor:
+    """How far feet are to be moved (..., frames, 2, 3), also between contacts.
+
+    There, what the last frame of one contact asks for fades out and what the first of the next one
+    asks for fades in, each over `blend` frames.
+    """
+    since, until = _distance(held, before=True), _distance(held, before=False)
+    last = held.shape[-2] - 1
+    at = torch.arange(last + 1, device=held.device)[:, None]
+    before = onto.gather(-3, (at - since).clamp(min=0)[..., None].expand_as(onto))
+    after = onto.gather(-3, (at + until).clamp(max=last)[..., None].expand_as(onto))
+    between = _fading(since, blend)[..., None] * before + _fading(until, blend)[..., None] * after
+    return torch.where(held[..., None], onto, between)
+
+
+def _fading(distance: Tensor, blend: float) -> Tensor:
+    """From 1 at distance 0 to 0 at `blend` frames, level at both ends."""
+    left = (1 - distance / max(blend, 1e-9)).clamp(0, 1)
+    return left * left * (3 - 2 * left)
+
+
+def _above(shift: Tensor, points: Tensor, joints: dict, ground: Tensor, skeleton: Skeleton):
+    """The shift, with feet lifted where they would be in the floor: ankles and toe joints."""
+    rest = _toe_heights(skeleton).to(points)
+    floor = (ground - rest)[..., None, :]  # (..., 1, 2)
+    toe = points[..., joints["toes"], 1] + shift[..., 1] - ground[..., None, :]
+    ankle = points[..., joints["foot"], 1] + shift[..., 1] - floor
+    lift = -torch.minimum(toe, ankle).clamp(max=0)
+    return shift + torch.stack([torch.zeros_like(lift), lift, torch.zeros_like(lift)], dim=-1)
+
+
+def _sink(points: Tensor, ankle: Tensor, joints: dict, fps: float) -> Tensor:
+    """How far the root comes down (..., frames, 3) for both legs to reach their ankles."""
+    hip, knee = points[..., joints["upper_leg"], :], points[..., joints["lower_leg"], :]
+    length = (knee - hip).norm(dim=-1) + (points[..., joints["foot"], :] - knee).norm(dim=-1)
+    was = (points[..., joints["foot"], :] - hip).norm(dim=-1)
+    moved = (ankle - points[..., joints["foot"], :]).norm(dim=-1)
+    stays = was.minimum(length) - (moved - NEAR).clamp(min=0)
+    reach = torch.maximum(REACH * length, stays)
+    way = hip - ankle
+    level = way[..., [0, 2]].square().sum(-1)
+    needed = way[..., 1] - (reach.square() - level).clamp(min=1e-4).sqrt()
+    needed = torch.where(needed > 1e-4, needed, 0).amax(-1)  # (..., frames)
+    down = _smoothed_over(needed, SETTLE * fps)
+    return torch.stack([torch.zeros_like(down), down, torch.zeros_like(down)], dim=-1)
+
+
+def _smoothed_over(values: Tensor, sigma: float) -> Tensor:
+    """A smooth curve (..., frames) that is nowhere below `values`."""
+    if not values.any():
+        return values
+    reach = max(1, math.ceil(2 * sigma))
+    rows = values.reshape(-1, 1, values.shape[-1])
+    widest = max_pool1d(rows, 2 * reach + 1, stride=1, padding=reach)
+    bell = torch.exp(-(torch.arange(-reach, reach + 1).to(values) / sigma).square() / 2)
+    widened = pad(widest, (reach, reach), mode="replicate")
+    return torch.conv1d(widened, (bell / bell.sum())[None, None]).reshape(values.shape)
+
+
+# -- how legs get there -----------------------------------------------------------------------------
+
+
+def _bent(
+    skeleton: Skeleton, joints: dict, points: Tensor, world: Tensor, rotations: Tensor,
+    hips: Tensor, ankle: Tensor, shift: Tensor, ground: Tensor,
+) -> Tensor:  # fmt: skip
+    """Local rotations with legs that reach their ankles; feet keep the way they point."""
+    rotations = rotations.clone()
+    for i, side in enumerate(SIDES):
+        upper, lower, foot, toes = (joints[part][i] for part in PARTS)
+        knee_was = points[..., lower, :] - points[..., upper, :]
+        offsets = [
+            skeleton.below(f"{side}_{a}", f"{side}_{b}").to(points)
+            for a, b in (("upper_leg", "lower_leg"), ("lower_leg", "foot"))
+        ]
+        ahead = _knee_direction(points, world, upper, lower, foot)
+        thigh, shank = two_bone(hips[..., i, :], ankle[..., i, :], ahead, *offsets)
+        knee = thigh @ offsets[0]
+        shin = thigh @ shank @ offsets[1]
+        # the smallest turns of the bones as they were, so that no bone is twisted
+        turned = {
+            upper: shortest_turn(knee_was, knee) @ world[..., upper, :, :],
+            lower: shortest_turn(points[..., foot, :] - points[..., lower, :], shin)
+            @ world[..., lower, :, :],
+            foot: world[..., foot, :, :],
+        }
+        if foot != toes < skeleton.joints:  # a joint, not the end of the foot
+            turned[toes] = _toes_up(skeleton, side, points, world, shift, ground, toes, i)
+        for joint, whole in turned.items():
+            parent = skeleton.parents[joint]
+            above = turned.get(parent, world[..., parent, :, :])
+            rotations[..., joint, :, :] = above.mT @ whole
+    return rotations
+
+
+def _toes_up(skeleton, side, points, world, shift, ground, toes, i) -> Tensor:
+    """World orientation of the toes, pitched up where their tip would be in the floor."""
+    ends = zip(skeleton.end_parents, skeleton.end_offsets, strict=True)
+    tip = next((offset for parent, offset in ends if parent == toes), torch.zeros(3))
+    rest = _toe_heights(skeleton)[i].to(points)
+    height = points[..., toes, 1] + shift[..., i, 1] - (ground[..., i] - rest)[..., None]
+    flat = world[..., toes, :, :].reshape(-1, 3, 3)
+    return off_the_floor(flat, height.reshape(-1), tip.to(flat)).reshape(
+        world[..., toes, :, :].shape
+    )
+
+
+def _knee_direction(points: Tensor, world: Tensor, upper: int, lower: int, foot: int) -> Tensor:
+    """Which way a knee points (..., 3): where it is beside the line from hip to ankle.
+
+    Where the leg is nearly straight, that is where the thigh's front is.
+    """
+    line = points[..., foot, :] - points[..., upper, :]
+    line = line / line.norm(dim=-1, keepdim=True).clamp(min=1e-9)
+    aside = points[..., lower, :] - points[..., upper, :]
+    aside = aside - (aside * line).sum(-1, keepdim=True) * line
+    front = world[..., upper, :, 2]
+    front = front - (front * line).sum(-1, keepdim=True) * line
+    backwards = (aside * front).sum(-1, keepdim=True) < 0
+    aside = torch.where(backwards, torch.zeros_like(aside), aside)
+    return aside + (STRAIGHT - aside.norm(dim=-1, keepdim=True)).clamp(min=0) * front
+
+
+def _legs(skeleton: Skeleton) -> dict[str, list[int]]:
+    """Joints of both legs, left first: {part: [left, right]}; toes as `contacts.foot_points`."""
+    joints = {part: [skeleton.index(f"{s}_{part}") for s in SIDES] for part in PARTS[:3]}
+    return joints | {"toes": [foot_points(skeleton)[1], foot_points(skeleton)[3]]}
+
+
+def _forward(skeleton: Skeleton, root_positions: Tensor, rotations: Tensor):
+    """Points (..., frames, points, 3) and world orientations (..., frames, joints, 3, 3)."""
+    return forward_kinematics(
+        skeleton.parents, skeleton.offsets.to(rotations), root_positions, rotations,
+        skeleton.end_parents, skeleton.end_offsets.to(rotations),
+    )  # fmt: skip
+
+
+def _checked(contacts, root_positions: Tensor, floor, blend, fps) -> Tensor:
+    """Contacts (..., frames, 2) of the toes; raises ModelError."""
+    contacts = torch.as_tensor(contacts, device=root_positions.device)
+    shape = tuple(contacts.shape)
+    if contacts.dtype != torch.bool or shape not in [
+        (*root_positions.shape[:-1], n) for n in (2, 4)
+    ]:
+        raise ModelError(
+            f"lock_feet: contacts are {contacts.dtype} of shape {shape}; they must be bool, "
+            f"{(*root_positions.shape[:-1], 2)} for both toes (or 4 with the heels)."
+        )
+    if not 0 <= blend < math.inf or not (floor is None or math.isfinite(floor)):
+        raise ModelError(
+            f"lock_feet: blend {blend} s, floor {floor} m; both must be numbers, blend from 0."
+        )
+    return contacts if shape[-1] == 2 else contacts[..., [1, 3]]

@@ -1,0 +1,48 @@
+"""Let a network dream under sliders: in a kernel, or in a page with the reader's browser."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+from torch import nn
+
+from ..pictures import palette
+from .dream_kernel import controls
+from .dream_page import page_figure
+
+
+def dream(
+    model: nn.Module,
+    *,
+    seconds: float = 10.0,
+    characters: int = 1,
+    trail: str | int | Sequence[str | int] | None = None,
+    color: str = "RNN",
+    caption: str | None = None,
+    height: int = 380,
+) -> Any:
+    """Let a trained network go on from one of its starts, under sliders.
+
+    In a running kernel Python samples, and ipywidgets act on it; see `dream_kernel`. In a built page
+    the network itself runs, without end: see `page_figure`.
+
+    Parameters
+    ----------
+    model : as `motionlab.load` gives it.
+    seconds : how long the motion is at first, in a kernel; a page goes on without end.
+    characters : how many futures of a start there are at first.
+    trail : joints (names, roles or point indices) that leave a trail; by default hips and toes.
+    color : a method's name or a colour.
+    caption : a text below the figure.
+    height : of the picture, pixels.
+
+    Raises
+    ------
+    ViewerError : another kind of model, or one without starts.
+    """
+    look = {"trail": trail, "color": palette.check_color(color), "height": height}
+    if os.environ.get("MOTIONLAB_VIEWER") == "page":
+        return page_figure(model, characters, caption, **look)
+    return controls(model, seconds, characters, caption, **look)

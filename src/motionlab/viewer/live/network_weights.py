@@ -1,0 +1,170 @@
+"""A network as a script that a page can load: weights rounded to a byte each, encoding, starts.
+
+web/src/network/ is the other side: weights.js reads the script; each kind of network and of
+encoding that stands in a table here has a file of its own there.
+"""
+
+from __future__ import annotations
+
+import base64
+import copy
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ...encodings import Encoding, JointAngles, RootRelative
+from ...errors import ViewerError
+
+GLOBAL = "motionlabWeights"  # where the page looks for what a script of weights brings
+
+# Matrices, side by side, and bias of a layer. An LSTM's two biases are only ever added.
+Layer = tuple[list[Tensor], Tensor]
+
+
+@dataclass(frozen=True)
+class WeightsScript:
+    """Weights as a script that a page, also one opened from disk, can load."""
+
+    name: str  # the page knows them by it
+    text: str
+
+    @property
+    def file(self) -> str:
+        return f"motionlab-weights-{self.name}.js"
+
+    def write(self, folder: str | Path) -> Path:
+        path = Path(folder) / self.file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(self.text, encoding="utf-8")
+        return path
+
+
+def weights_script(model: nn.Module, name: str, rounded: bool = True) -> WeightsScript:
+    """All that web/src/network/weights.js reads; `rounded` to a byte a weight, or float32.
+
+    Raises ViewerError if the browser can't run the model.
+    """
+    check_known(model)
+    settings, layers = _taken_apart(model)
+    packed = {part: [_pack(*layer, rounded) for layer in group] for part, group in layers.items()}
+    normalizer, starts = model.normalizer, model.starts
+    content = {
+        "kind": type(model).__name__,
+        "settings": settings,
+        "fps": model.fps,
+        "kept": normalizer.kept.tolist(),
+        "mean": _base64(normalizer.mean),
+        "std": _base64(normalizer.std),
+        "layers": {**packed, "leave": packed["leave"][0]},
+        "encoding": _encoding(model.encoding),
+        "starts": [
+            {"name": label, **{key: _base64(part[i]) for key, part in starts._asdict().items()}}
+            for i, label in enumerate(model.start_names)
+        ],
+    }
+    data = json.dumps(content, separators=(",", ":"))
+    name = f"{name}-{hashlib.sha256(data.encode()).hexdigest()[:8]}"  # no stale copy from a cache
+    key = json.dumps(name)
+    text = f"globalThis.{GLOBAL} = globalThis.{GLOBAL} || {{}};\n{GLOBAL}[{key}] = {data};\n"
+    return WeightsScript(name, text)
+
+
+def as_in_browser(model: nn.Module) -> nn.Module:
+    """A copy whose weights are rounded as they are for the browser, to measure what that costs."""
+    model = copy.deepcopy(model)
+    for group in _taken_apart(model)[1].values():
+        for matrices, _ in group:
+            whole, scales = _round(torch.cat([m.detach() for m in matrices], dim=1))
+            parts = (whole * scales[:, None]).split([m.shape[1] for m in matrices], dim=1)
+            for matrix, part in zip(matrices, parts, strict=True):
+                matrix.data.copy_(part)
+    return model
+
+
+def check_known(model: nn.Module) -> None:
+    """Raise ViewerError if the browser can't run a model, or knows nothing of its features."""
+    kind = type(model).__name__
+    if kind not in ("AcLstm", "LstmGmm"):
+        raise ViewerError(f"The browser can run an AcLstm or an LstmGmm, not a {kind}.")
+    encoding = model.encoding
+    angles = isinstance(encoding, JointAngles) and encoding.rotation == "vector"
+    points = isinstance(encoding, RootRelative) and encoding.height == "absolute"
+    if not angles and not points:
+        raise ViewerError(
+            "The browser knows features of JointAngles with rotation='vector' and of RootRelative "
+            f"with height='absolute' only; this model has another {type(encoding).__name__}."
+        )
+
+
+# -- networks ---------------------------------------------------------------------------------------
+
+
+def _taken_apart(model: nn.Module) -> tuple[dict[str, Any], dict[str, list[Layer]]]:
+    """A network's few settings, and all of its layers."""
+    leave = [([model.leave.weight], model.leave.bias)]
+    if type(model).__name__ == "AcLstm":
+        gates = [([layer.weight], layer.bias) for layer in model.gates]
+        return {"staircase": model.staircase}, {"enter": [], "lstm": gates, "leave": leave}
+    enter = [([layer.weight], layer.bias) for layer in (model.enter[0], model.enter[2])]
+    parts = model.lstm.all_weights  # [W_ih, W_hh, b_ih, b_hh] a layer
+    lstm = [([w_ih, w_hh], b_ih + b_hh) for w_ih, w_hh, b_ih, b_hh in parts]
+    settings = {
+        "components": model.components,
+        "skip": model.skip,
+        "reach": model.reach,
+        "floor": model.floor.tolist(),
+    }
+    return settings, {"enter": enter, "lstm": lstm, "leave": leave}
+
+
+def _pack(matrices: list[Tensor], bias: Tensor, rounded: bool) -> dict[str, Any]:
+    matrix = torch.cat(matrices, dim=1).detach()
+    packed = {"columns": matrix.shape[1], "bias": _base64(bias)}
+    if not rounded:
+        return packed | {"weight": _base64(matrix)}
+    whole, scales = _round(matrix)
+    return packed | {"weight": _base64(whole, "i1"), "scales": _base64(scales)}
+
+
+def _round(matrix: Tensor) -> tuple[Tensor, Tensor]:
+    """Whole numbers from -127 to 127 (rows, columns) and what one of them stands for, (rows,)."""
+    scales = matrix.abs().amax(1).clamp(min=1e-12) / 127
+    return (matrix / scales[:, None]).round(), scales
+
+
+def _base64(values: Tensor, kind: str = "<f4") -> str:
+    array = values.detach().cpu().numpy().astype(kind)
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+
+
+# -- encodings --------------------------------------------------------------------------------------
+
+
+def _encoding(encoding: Encoding) -> dict[str, Any]:
+    """What turns rows into points."""
+    skeleton = encoding.skeleton
+    if isinstance(encoding, RootRelative):
+        # a row of ones has the root at a height of one unit
+        metres = encoding.positions(torch.ones(1, encoding.dim, dtype=torch.float64))[0, 0, 1]
+        legs = [skeleton.index(f"{side}_upper_leg") for side in ("left", "right")]
+        return {
+            "kind": "RootRelative",
+            "points": encoding.points,
+            "metres": float(metres),
+            "legs": legs,
+        }
+    return {
+        "kind": "JointAngles",
+        "parents": list(skeleton.parents),
+        "offsets": skeleton.offsets.tolist(),
+        "end_parents": list(skeleton.end_parents),
+        "end_offsets": skeleton.end_offsets.tolist(),
+        "mean_pose": encoding.mean_pose.flatten(1).tolist(),
+        "contacts": "contacts" in encoding.slices,
+    }

@@ -1,0 +1,269 @@
+"""The motion player: numbers packed for the browser, as a live widget or as a piece of a page.
+
+A built page has no kernel, so the motion itself travels in it: positions are rounded to a tenth of
+a millimetre, taken relative to the root, and sent as changes of their changes: a body moves on as it
+moved, so that most numbers fit one byte.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import anywidget
+import numpy as np
+import torch
+import traitlets
+from torch import Tensor
+
+from ...errors import ViewerError
+from ...skeleton import Skeleton
+from ..pictures.body import Body, body
+
+STATIC = Path(__file__).parent / "static"
+ROOT_UNIT = 1e-4  # metres; an int32 reaches 214 km
+FINEST = 1e-4  # metres, for points relative to the root: an int16 reaches 3.3 m
+COARSEST = 2e-3  # metres; rounding is then off by half of it, the contract's 1 mm
+FLOOR_SLACK = 0.15  # metres
+SHOWN_FPS = 30.0  # a browser mixes frames in between; more would only weigh more
+
+
+@dataclass(frozen=True)
+class Track:
+    """What one figure needs: ``positions`` (frames, points, 3) metres, a body, how it looks."""
+
+    positions: Tensor
+    skeleton: Skeleton
+    label: str = ""
+    color: str = "#9aa3ad"
+    contacts: Tensor | None = None  # bool (frames, 4)
+
+
+def bundle_path() -> Path:
+    """The player's script for built pages (one for the whole book; the style is inside)."""
+    return _built("player.js")
+
+
+def _built(name: str) -> Path:
+    if not (STATIC / name).is_file():
+        raise ViewerError(
+            f"The player's script {STATIC / name} is missing: it is bundled when the package is "
+            "built. Run `pip install -e .` in the repository (it needs no Node of your own)."
+        )
+    return STATIC / name
+
+
+def payload(
+    tracks: Sequence[Track],
+    fps: float,
+    *,
+    paths: Sequence[dict[str, Any]] = (),
+    trail: Sequence[int] = (),
+    **options: Any,
+) -> dict[str, Any]:
+    """The JSON object that the player reads.
+
+    Parameters
+    ----------
+    tracks : the figures; they share one clock, a shorter one waits at its end.
+    fps : frames per second of all of them.
+    paths : ``{"points": [[x, z], ...], "color": "#...", "track": index or None}``, metres.
+    trail : points that leave a trail.
+    options : height, follow, overlay, autoplay, speed; choose, the name of a slider over the tracks,
+        of which one is seen at a time, and chosen, which is at first.
+
+    Every ``stride``-th frame is stored, so that at least `SHOWN_FPS` a second are; ``frames`` and
+    the player's clock count the motion's own frames.
+    """
+    stride = max(1, int(fps / SHOWN_FPS + 1e-3))
+    return {
+        "version": 1,
+        "fps": fps,
+        "frames": max(len(track.positions) for track in tracks),
+        "stride": stride,
+        "tracks": [_pack(track, stride) for track in tracks],
+        "paths": list(paths),
+        "trail": [int(point) for point in trail],
+        "floor": floor_height(tracks[0]),
+        **options,
+    }
+
+
+def floor_height(track: Track) -> float:
+    """Height in metres where the soles are in all but the lowest 2 % of the frames.
+
+    Sources put y = 0 some centimetres above or below the sole. A motion whose lowest point is
+    farther from it than that (a jump, a drifting model) keeps its floor at 0.
+    """
+    dress = body(track.skeleton)
+    points = dress.points(track.positions)[..., 1]
+    ends = [(end, radius) for a, b, ra, rb in dress.bones for end, radius in ((a, ra), (b, rb))]
+    if not ends:
+        return 0.0
+    index, radius = zip(*ends, strict=True)
+    lowest = (points[:, list(index)] - torch.tensor(radius)).amin(dim=1)
+    sole = float(lowest.quantile(0.02))
+    return round(sole, 4) if abs(sole) < FLOOR_SLACK else 0.0
+
+
+def _pack(track: Track, stride: int) -> dict[str, Any]:
+    dress = body(track.skeleton)
+    root, local, scale = quantise(track.positions[::stride].numpy(), track.skeleton, dress)
+    return {
+        "label": track.label,
+        "color": track.color,
+        "points": local.shape[1],
+        "frames": len(local),
+        "root": _base64(root, "<i4"),
+        "local": _base64(in_few_bytes(local), "u1"),
+        "scale": scale,
+        "extras": [list(extra) for extra in dress.extras],
+        "bones": [list(bone) for bone in dress.bones],
+        "head": dress.head,
+        "contacts": _bitmask(track.contacts, stride, dress),
+        "contact_points": list(dress.feet),
+    }
+
+
+def quantise(
+    positions: np.ndarray, skeleton: Skeleton, dress: Body
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Integers for positions (frames, points, 3): root (frames, 3), local, and local's unit.
+
+    The root is the hips where they are known: some files have a root joint that stays behind.
+    Points that no bone touches (such a root) are not drawn; they are sent as if at the root.
+    """
+    drawn = _drawn_points(dress, positions.shape[1])
+    middle = skeleton.roles.get("hips", 0)
+    positions = np.asarray(positions, dtype=np.float64)
+    _check_finite(positions[:, [*drawn, middle]], [*drawn, middle], skeleton)
+    root = np.rint(positions[:, middle] / ROOT_UNIT)
+    limit = np.iinfo(np.int32).max
+    local = np.zeros_like(positions)
+    local[:, drawn] = positions[:, drawn] - root[:, None] * ROOT_UNIT
+    reach = np.abs(local).max(initial=0.0)
+    scale = min(max(reach / np.iinfo(np.int16).max, FINEST), COARSEST)
+    steps = np.rint(local / scale)
+    held = np.iinfo(np.int16).max
+    if np.abs(steps).max(initial=0) > held or np.abs(root).max(initial=0) > limit:
+        warnings.warn(
+            f"A point lies {reach:.0f} m from the hips: the motion has exploded or is not in "
+            f"metres. It is shown cut off at {held * scale:.0f} m.",
+            stacklevel=4,
+        )
+    root = np.clip(root, -limit, limit).astype(np.int32)
+    return root, np.clip(steps, -held, held).astype(np.int16), scale
+
+
+def in_few_bytes(numbers: np.ndarray) -> np.ndarray:
+    """Bytes for int16 numbers (frames, ...): each says how much the change itself has changed.
+
+    A number takes as many bytes as it needs: seven bits in each, the lowest first, and a high bit
+    if more follow; its sign is its lowest bit.
+    """
+    rest = np.zeros((2, *numbers.shape[1:]), dtype=np.int32)
+    bent = np.diff(np.concatenate([rest, numbers]), n=2, axis=0).ravel()
+    unsigned = np.where(bent < 0, -2 * bent - 1, 2 * bent)
+    shifts = np.array([0, 7, 14])  # 18 bits at most: 4 * 2^15, and the sign
+    pieces = unsigned[:, None] >> shifts
+    follows = pieces[:, 1:] > 0
+    sent = (pieces & 127).astype(np.uint8)
+    sent[:, :-1] |= (follows * 128).astype(np.uint8)
+    needed = np.concatenate([np.ones((len(bent), 1), bool), follows], axis=1)
+    return sent[needed]
+
+
+def _drawn_points(dress: Body, points: int) -> list[int]:
+    used = {index for bone in dress.bones for index in bone[:2]} | set(dress.feet)
+    behind = {p for index in used if index >= points for p in dress.extras[index - points][:2]}
+    return sorted(index for index in used | behind if index < points) or list(range(points))
+
+
+def _check_finite(positions: np.ndarray, points: list[int], skeleton: Skeleton) -> None:
+    bad = ~np.isfinite(positions).all(axis=-1)
+    if bad.any():
+        frame, point = np.argwhere(bad)[0]
+        raise ViewerError(
+            f"The motion to show has {int(bad.any(axis=1).sum())} frames with NaN or infinite "
+            f"positions, the first at frame {frame} (of those shown), point "
+            f"{skeleton.point_names[points[point]]!r}. Cut the motion before it with a slice, "
+            "or find out what produced it."
+        )
+
+
+def _bitmask(contacts: Tensor | None, stride: int, dress: Body) -> str | None:
+    if contacts is None or not dress.feet:
+        return None
+    bits = np.asarray(contacts[::stride], dtype=np.uint8) << np.arange(4, dtype=np.uint8)
+    return _base64(bits.sum(axis=1), "u1")
+
+
+def _base64(values: np.ndarray, kind: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
+
+
+class Player(anywidget.AnyWidget):
+    """The live player. Its traits can be linked to other widgets.
+
+    >>> ipywidgets.jslink((slider, "value"), (player, "frame"))  # doctest: +SKIP
+
+    works in the browser alone, also without a kernel.
+    """
+
+    _esm = STATIC / "widget.js"
+
+    payload = traitlets.Dict().tag(sync=True)
+    # no echo: while a kernel is busy frames queue up; late echoes would undo what it sets then
+    frame = traitlets.Int(0).tag(sync=True, echo_update=False)
+    playing = traitlets.Bool(False).tag(sync=True)
+    speed = traitlets.Float(1.0, min=0.0).tag(sync=True)
+    follow = traitlets.Bool(True).tag(sync=True)
+    overlay = traitlets.Bool(False).tag(sync=True)
+    chosen = traitlets.Int(0).tag(sync=True)
+    caption = traitlets.Unicode("").tag(sync=True)
+
+    def __init__(self, payload: dict[str, Any], **traits: Any):
+        _built("widget.js")
+        shared = ("speed", "follow", "overlay", "chosen")
+        state = {name: payload[name] for name in shared if name in payload}
+        playing = bool(payload.get("autoplay", False))
+        super().__init__(payload=payload, **{"playing": playing, **state, **traits})
+
+    def __repr__(self) -> str:
+        count = len(self.payload["tracks"])
+        return (
+            f"Player({count} motion{'s' if count > 1 else ''}, {self.payload['frames']} frames, "
+            f"{self.payload['fps']:g} fps)"
+        )
+
+    @traitlets.validate("frame")
+    def _inside(self, proposal: dict[str, Any]) -> int:
+        return min(max(proposal["value"], 0), self.payload["frames"] - 1)
+
+    @traitlets.validate("chosen")
+    def _one_of_them(self, proposal: dict[str, Any]) -> int:
+        return min(max(proposal["value"], 0), len(self.payload["tracks"]) - 1)
+
+
+def page_html(payload: dict[str, Any], still: str | None = None, caption: str | None = None) -> str:
+    """The player without a kernel: a figure that the book's one script brings to life.
+
+    `still`, a data URL, is seen where scripts are off; `caption` is plain text.
+    """
+    # "</script>" inside a string would end the element: escape every "<".
+    data = json.dumps(payload, separators=(",", ":")).replace("<", "\\u003c")
+    labels = ", ".join(track["label"] for track in payload["tracks"] if track["label"])
+    alt = html.escape(f"Still picture of the motion {labels}".strip(), quote=True)
+    picture = f'<img src="{still}" alt="{alt}" style="max-width:100%">' if still else ""
+    text = f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
+    return (
+        '<figure class="motionlab-player" style="margin:1rem 0">'
+        f'<script type="application/json">{data}</script>'
+        f"<noscript>{picture}</noscript>{text}</figure>"
+    )

@@ -1,0 +1,1 @@
+"""What makes pictures of motion: stills, film strips, videos, plots; the mannequin and its colours."""

@@ -1,0 +1,221 @@
+"""Locked feet hold still, nothing else jumps, and wrong labels do no more than harm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from motionlab import Skeleton, contacts, load
+from motionlab.datasets import gaits
+from motionlab.errors import ModelError
+from motionlab.feet.contacts import foot_points
+from motionlab.feet.lock import _clean, lock
+from motionlab.metrics import foot_skate
+from motionlab.solvers import lock_feet
+
+TOES = [1, 3]
+
+
+def sliding(seconds=4.0, speed=1.4, slide=0.15, seed=0, **more):
+    """A gait whose feet slide to the left while they rest, and its exact contacts (frames, 2)."""
+    motion = gaits.make(seconds=seconds, speed=speed, noise=0.5, seed=seed, **more)
+    aside = slide * torch.arange(len(motion)) / motion.fps
+    root = motion.root_positions + aside[:, None] * torch.tensor([1.0, 0.0, 0.0])
+    return replace(motion, root_positions=root), motion.contacts[:, TOES]
+
+
+def toes_of(motion):
+    return motion.positions()[:, [foot_points(motion.skeleton)[i] for i in TOES]]
+
+
+def held_steps(motion, down):
+    """Millimetres that toes move from frame to frame while they are held throughout."""
+    held = _clean(down, motion.fps)
+    steps = 1000 * toes_of(motion).diff(dim=0).norm(dim=-1)
+    return steps[held[1:] & held[:-1]]
+
+
+def peak_acceleration(motion):
+    points = motion.positions()
+    return float((points[2:] - 2 * points[1:-1] + points[:-2]).norm(dim=-1).max() * motion.fps**2)
+
+
+@pytest.mark.parametrize("speed", [0.8, 1.4, 2.8])
+@pytest.mark.parametrize("turn_rate", [0.0, 0.6])
+def test_what_slid_holds_still_and_nothing_pops(speed, turn_rate):
+    motion, down = sliding(speed=speed, turn_rate=turn_rate)
+    assert held_steps(motion, down).mean() > 3
+    locked = lock_feet(motion, down)
+    assert held_steps(locked, down).max() < 0.1
+    assert peak_acceleration(locked) < 1.1 * peak_acceleration(motion)
+    assert locked.positions()[..., 1].min() > -1e-3
+    before, after = (foot_skate(m.positions(), down, m.skeleton, m.fps) for m in (motion, locked))
+    assert before > 12 and after < 0.5
+    # the way and the arms are left alone, but for how high the root is
+    assert torch.equal(locked.root_positions[:, [0, 2]], motion.root_positions[:, [0, 2]])
+    arms = [motion.skeleton.index(name) for name in ("left_upper_arm", "right_hand", "head")]
+    assert torch.equal(locked.rotations[:, arms], motion.rotations[:, arms])
+
+
+def test_a_leg_that_was_straight_does_not_snap():
+    model, refiner = load("lstm-gmm-contacts"), load("refiner-contacts")
+    start = model.start_names.index("run 2.6 m/s, turn left")  # whose legs are quite straight
+    with torch.no_grad():
+        features = refiner(
+            model.generate(
+                300, model.starts, generator=torch.Generator().manual_seed(3), **model.sampling
+            )
+        )
+    dream = model.encoding.to_motion(features[start])
+    locked = lock_feet(dream, floor=None)
+    assert peak_acceleration(locked) < 1.2 * peak_acceleration(dream)
+
+
+def test_feet_keep_the_way_they_point_and_bones_their_length():
+    motion, down = sliding()
+    locked = lock_feet(motion, down)
+    feet = [motion.skeleton.index(f"{side}_foot") for side in ("left", "right")]
+    turned = locked.orientations()[:, feet].mT @ motion.orientations()[:, feet]
+    assert torch.allclose(turned, torch.eye(3).expand_as(turned), atol=1e-5)
+    eye = locked.rotations.mT @ locked.rotations
+    assert torch.allclose(eye, torch.eye(3).expand_as(eye), atol=1e-5)
+
+
+def test_what_is_locked_stays_as_it_is():
+    still = gaits.make(seconds=4, speed=1.4, noise=0.5, seed=3)
+    locked = lock_feet(still)
+    assert (locked.positions() - still.positions()).abs().max() < 1e-4
+    motion, down = sliding()
+    once = lock_feet(motion, down)
+    assert (lock_feet(once, down).positions() - once.positions()).abs().max() < 1e-4
+
+
+def test_knees_bend_forward():
+    motion, down = sliding(speed=2.8)
+    locked = lock_feet(motion, down)
+    for side in ("left", "right"):
+        knee = locked.rotations[:, locked.skeleton.index(f"{side}_lower_leg")]
+        pitch = torch.atan2(knee[:, 2, 1], knee[:, 1, 1])  # about x: above 0 is bent backwards up
+        assert pitch.min() > -0.02
+
+
+def test_a_batch_is_its_motions_one_by_one():
+    many = [sliding(speed=v, seed=i) for i, v in enumerate((0.9, 1.4, 2.8))]
+    place, turns = lock(
+        many[0][0].skeleton,
+        torch.stack([m.root_positions for m, _ in many]),
+        torch.stack([m.rotations for m, _ in many]),
+        torch.stack([down for _, down in many]),
+        30,
+    )
+    for i, (motion, down) in enumerate(many):
+        alone = lock_feet(motion, down)
+        assert torch.allclose(place[i], alone.root_positions, atol=1e-5)
+        assert torch.allclose(turns[i], alone.rotations, atol=1e-4)
+
+
+@settings(deadline=None, max_examples=15)
+@given(seed=st.integers(0, 1000), wrong=st.sampled_from([0.05, 0.2, 0.5]))
+def test_wrong_labels_give_a_worse_gait_that_stays_whole(seed, wrong):
+    motion, down = sliding(seed=seed)
+    chance = torch.Generator().manual_seed(seed)
+    flipped = down ^ (torch.rand(down.shape, generator=chance) < wrong)
+    moved = lock_feet(motion, flipped).positions() - motion.positions()
+    assert moved.isfinite().all() and moved.norm(dim=-1).max() < 0.5
+
+
+def test_labels_that_say_nothing():
+    motion, down = sliding()
+    unlabelled = lock_feet(motion, torch.zeros_like(down))
+    assert (unlabelled.positions() - motion.positions()).abs().max() < 1e-4
+    stuck = lock_feet(motion, torch.ones_like(down)).positions() - motion.positions()
+    assert stuck.isfinite().all() and stuck.norm(dim=-1).max() < 0.5
+
+
+def test_the_floor_is_where_it_is_said_to_be_or_where_toes_rest():
+    motion, down = sliding()
+    high = replace(motion, root_positions=motion.root_positions + torch.tensor([0.0, 0.1, 0.0]))
+    for floor in (0.1, None):
+        locked = lock_feet(high, down, floor=floor)
+        expected = lock_feet(motion, down).positions() + torch.tensor([0.0, 0.1, 0.0])
+        assert (locked.positions() - expected).norm(dim=-1).max() < 0.005
+    lower = lock_feet(high, down).positions()  # the floor is at 0: down to it
+    assert (
+        abs(float(lower[..., 1].min() - lock_feet(motion, down).positions()[..., 1].min())) < 5e-3
+    )
+
+
+def test_a_rest_pose_that_hangs_from_its_root_has_a_floor_too():
+    motion, down = sliding()
+    skeleton = motion.skeleton
+    lifted = skeleton.offsets.clone()
+    lifted[0] = 0
+    hanging = replace(skeleton, offsets=lifted)
+    same = replace(motion, skeleton=hanging)
+    assert torch.allclose(same.positions(), motion.positions(), atol=1e-5)
+    locked = lock_feet(same, down, floor=None).positions()
+    # its lowest joint stands for the sole, which is up to 3 cm lower
+    assert (locked - lock_feet(motion, down, floor=None).positions()).norm(dim=-1).max() < 0.03
+
+
+def test_gaps_are_filled_and_flickers_left_out():
+    row = torch.tensor([int(x) for x in "0011110111100010000"]).bool()[:, None].repeat(1, 2)
+    clean = "".join(str(int(x)) for x in _clean(row, 30)[:, 0])
+    assert clean == "0011111111100000000"
+
+
+def test_own_contacts_and_those_of_both_parts_of_a_foot_are_understood():
+    motion, down = sliding()
+    four = torch.zeros(len(motion), 4, dtype=torch.bool)
+    four[:, TOES] = down
+    same = lock_feet(motion, down).positions()
+    assert torch.equal(lock_feet(motion, four).positions(), same)
+    assert torch.equal(lock_feet(replace(motion, contacts=four)).positions(), same)
+    found = lock_feet(motion, contacts.label(motion))
+    assert found.positions().isfinite().all()
+
+
+def test_a_foot_without_a_toe_joint_is_held_by_its_end():
+    skeleton = gaits.make(seconds=1).skeleton
+    toes = [skeleton.index(f"{side}_toes") for side in ("left", "right")]
+    keep = [joint for joint in range(skeleton.joints) if joint not in toes]
+    number = {joint: i for i, joint in enumerate(keep)} | {-1: -1}
+    ends = [i for i, joint in enumerate(skeleton.end_parents) if joint not in toes]
+    short = Skeleton(
+        tuple(skeleton.names[j] for j in keep),
+        tuple(number[skeleton.parents[j]] for j in keep),
+        skeleton.offsets[keep],
+        (
+            *(number[skeleton.end_parents[i]] for i in ends),
+            *(number[skeleton.parents[t]] for t in toes),
+        ),
+        torch.cat([skeleton.end_offsets[ends], skeleton.offsets[toes]]),
+    )
+    motion, down = sliding()
+    cut = replace(motion, skeleton=short, rotations=motion.rotations[:, keep], contacts=None)
+    locked = lock_feet(cut, down)
+    assert held_steps(cut, down).mean() > 3
+    assert held_steps(locked, down).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"contacts": torch.zeros(10, 2, dtype=torch.bool)}, r"shape \(10, 2\)"),
+        ({"contacts": np.zeros((120, 2))}, "float64"),
+        ({"contacts": torch.zeros(120, 3, dtype=torch.bool)}, r"\(120, 2\) for both toes"),
+        ({"blend": -1.0}, "blend -1.0 s"),
+        ({"floor": float("nan")}, "floor nan m"),
+    ],
+)
+def test_what_cannot_be_locked_is_said(wrong, message):
+    motion, down = sliding()
+    with pytest.raises(ModelError, match=message):
+        lock_feet(motion, **{"contacts": down} | wrong)
+    with pytest.raises(ModelError, match="has no contacts"):
+        lock_feet(replace(motion, contacts=None))
