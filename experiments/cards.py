@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import shlex
-import sys
 from dataclasses import asdict
 
+import record
 import torch
 from torch import nn
 
@@ -187,7 +187,7 @@ def _made_by(about: dict) -> str:
     """Rows on what made the weights."""
     return f"""\
 | made by | `{about["command"]}` |
-| and | `{shlex.join(["python", *sys.argv])}` |
+| and | `{shlex.join(record.command())}` |
 | motionlab | {motionlab.__version__}, torch {torch.__version__} |"""
 
 

@@ -13,12 +13,12 @@ from __future__ import annotations
 import argparse
 import json
 import platform
-import sys
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
+import record
 import torch
 
 import motionlab
@@ -52,7 +52,7 @@ def main() -> None:
     clips = {source: _train(source) for source in REAL}
     rows = [(c.source, c.path, c.split) for s in REAL for c in choose(s)]
     result = {
-        "command": " ".join(["python", *sys.argv]),
+        "command": " ".join(record.command()),
         "code_version": motionlab.__version__,
         "data_hash": splits.digest(rows),
         "clips": {source: len(motions) for source, motions in clips.items()},

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import record
 import roma
 import torch
 
@@ -37,7 +37,7 @@ def main() -> None:
     sources = {name: [m for m in clips if m.source == name] for name in {m.source for m in clips}}
     some = [m for motions in sources.values() for m in motions[:16]]
     result = {
-        "command": " ".join(["python", *sys.argv]),
+        "command": " ".join(record.command()),
         "code_version": motionlab.__version__,
         "data_hash": splits.digest([(c.source, c.path, c.split) for c in choose("locomotion")]),
         "sources": {name: recovered(motions) for name, motions in sorted(sources.items())},

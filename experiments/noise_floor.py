@@ -15,12 +15,12 @@ from __future__ import annotations
 import argparse
 import json
 import platform
-import sys
 import time
 from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
+import record
 import torch
 from torch import Tensor
 
@@ -51,7 +51,7 @@ def main() -> None:
     begin = time.perf_counter()
     rows = [(c.source, c.path, c.split) for name, _ in SETS.values() for c in choose(name)]
     result = {
-        "command": " ".join(["python", *sys.argv]),
+        "command": " ".join(record.command()),
         "code_version": motionlab.__version__,
         "data_hash": splits.digest(rows),
         "seed": SEED,

@@ -24,13 +24,24 @@ def run(main: Callable[[], None]) -> None:
     try:
         main()
     except motionlab.MotionLabError as error:
-        sys.exit(f"{Path(sys.argv[0]).stem}: {error}")
+        sys.exit(f"{script()[-1]}: {error}")
+
+
+def script() -> list[str]:
+    """What python was given to run: -m and the name of a module, or else a file."""
+    spec = getattr(sys.modules["__main__"], "__spec__", None)
+    return ["-m", spec.name] if spec else [sys.argv[0]]
+
+
+def command() -> list[str]:
+    """The command line that was given, word by word."""
+    return ["python", *script(), *sys.argv[1:]]
 
 
 def provenance(begin: float, seed: int, data: Prepared, **more) -> dict:
     """Where numbers come from; `begin` is the `time.perf_counter` at which the work began."""
     return {
-        "command": " ".join(["python", *sys.argv]),
+        "command": " ".join(command()),
         "code_version": motionlab.__version__,
         "data_hash": data.hash,
         "seed": seed,
