@@ -30,6 +30,11 @@ def verdicts():
     return verdicts
 
 
+@pytest.fixture(scope="module")
+def rnn_gan(verdicts):
+    return verdicts.verdicts_rnn_gan
+
+
 def claim_of(identity):
     return next(claim for claim in CLAIMS if claim["id"] == identity)
 
@@ -237,13 +242,13 @@ def test_every_rule_can_say_yes_and_no():
         assert {"not", "partly" if identity == "W2-rate" else "reproduced"} <= said, identity
 
 
-def test_a_network_that_says_one_thing_only_has_no_variety(verdicts, tmp_path):
+def test_a_network_that_says_one_thing_only_has_no_variety(rnn_gan, tmp_path):
     """And one that explodes in many ways has not either."""
     claim = claim_of("W1-variety")
     for ratios, sound in (([0.0] * 6, 1.0), ([0.0] * 6, 0.0)):
-        found = verdicts.w1_variety(claim["limits"], variety(ratios, sound))
+        found = rnn_gan.w1_variety(claim["limits"], variety(ratios, sound))
         assert found.verdict == "not"
-    assert verdicts.w1_variety(claim["limits"], variety([9.0] * 6, 0.0)).verdict == "partly"
+    assert rnn_gan.w1_variety(claim["limits"], variety([9.0] * 6, 0.0)).verdict == "partly"
 
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim["id"])
@@ -253,10 +258,10 @@ def test_without_results_all_is_open_and_with_ours_all_is_a_verdict(claim, verdi
     assert verdicts.judge(claim).verdict in verdicts.VERDICTS
 
 
-def test_edge_of_learning_rates_is_said(verdicts):
+def test_edge_of_learning_rates_is_said(rnn_gan):
     limits = claim_of("W2-optimiser")["limits"]
-    assert "edge" in verdicts.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.003")).remark
-    assert not verdicts.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.001")).remark
+    assert "edge" in rnn_gan.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.003")).remark
+    assert not rnn_gan.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.001")).remark
 
 
 @pytest.mark.parametrize(
@@ -266,18 +271,18 @@ def test_edge_of_learning_rates_is_said(verdicts):
      ((-1e9, 4, 5), (3, 3, 3), "worse"), ((1, 1, 1), (-float("inf"), 0, 0), "better"),
      ((-float("inf"), 0, 0), (-float("inf"), -1, -1), "no different")],
 )  # fmt: skip
-def test_compare(a, b, said, verdicts):
-    assert verdicts.compare(a, b, 0.5) == said
+def test_compare(a, b, said, rnn_gan):
+    assert rnn_gan.compare(a, b, 0.5) == said
 
 
-def test_a_training_that_fell_apart_counts_as_the_worst(verdicts):
+def test_a_training_that_fell_apart_counts_as_the_worst(rnn_gan):
     ruined = {"seed": 0, "fell apart": True}
     recipe = optimisers((5, 5, 5), (1, 1, 1), "0.001")
     recipe["rows"]["SGD"]["runs"][0] = ruined
-    assert verdicts.w2_optimiser(claim_of("W2-optimiser")["limits"], recipe).verdict == "reproduced"
+    assert rnn_gan.w2_optimiser(claim_of("W2-optimiser")["limits"], recipe).verdict == "reproduced"
     rows = {"table": {"runs": [ruined] * 3}, "no noise": {"runs": [{
         "seconds until failure": 9.0, "acceleration over data": 1.1}] * 3}}  # fmt: skip
-    assert verdicts.w2_noise(claim_of("W2-noise")["limits"], {"rows": rows}).verdict == "not"
+    assert rnn_gan.w2_noise(claim_of("W2-noise")["limits"], {"rows": rows}).verdict == "not"
 
 
 def test_verdicts_are_printed(verdicts, capsys):
