@@ -1,10 +1,8 @@
-"""What tests share: real clips, where there are any, and the scripts of experiments/."""
+"""What tests share: real clips, where there are any."""
 
 from __future__ import annotations
 
-import importlib
 import os
-import sys
 import zipfile
 from pathlib import Path
 
@@ -18,21 +16,6 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # torch reads it when it is imported
 
 SOURCES = ("accad", "aclstm-cmu", "bandai-actions", "bandai-locomotion", "cmu")
-EXPERIMENTS = Path(__file__).parents[1] / "experiments"
-
-
-@pytest.fixture(scope="session")
-def experiment():
-    """Import a script of experiments/ by its name, and with it what it imports from there."""
-
-    def load(name):
-        sys.path.insert(0, str(EXPERIMENTS))
-        try:
-            return importlib.import_module(name)
-        finally:
-            sys.path.remove(str(EXPERIMENTS))
-
-    return load
 
 
 @pytest.fixture(scope="session")

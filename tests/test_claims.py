@@ -3,7 +3,6 @@
 import json
 import re
 import shlex
-import sys
 from pathlib import Path
 
 import aclstm_cases
@@ -11,28 +10,15 @@ import pytest
 import refiner_cases
 import yaml
 
+from experiments.claims import rnn_gan, verdicts
 from motionlab import MotionLabError
 from motionlab.commands.reproduce import Reproduce, needed
 
 ROOT = Path(__file__).parents[1]
-BOOK = yaml.safe_load((ROOT / "experiments" / "claims.yaml").read_text(encoding="utf-8"))
+FILE = Path("experiments", "claims", "claims.yaml")
+BOOK = yaml.safe_load((ROOT / FILE).read_text(encoding="utf-8"))
 CLAIMS, STEPS = BOOK["claims"], BOOK["steps"]
 RULED = [claim["id"] for claim in CLAIMS if "rule" in claim]
-
-
-@pytest.fixture(scope="module")
-def verdicts():
-    sys.path.insert(0, str(ROOT / "experiments"))
-    try:
-        import verdicts
-    finally:
-        sys.path.pop(0)
-    return verdicts
-
-
-@pytest.fixture(scope="module")
-def rnn_gan(verdicts):
-    return verdicts.verdicts_rnn_gan
 
 
 def claim_of(identity):
@@ -50,7 +36,7 @@ def test_every_claim_of_the_papers_has_a_row():
 
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim["id"])
-def test_claim_is_whole_and_its_verdict_is_not_typed(claim, verdicts):
+def test_claim_is_whole_and_its_verdict_is_not_typed(claim):
     always = {"id", "paper", "claim", "words", "value"}
     ruled = {"ours", "rule", "because", "limits", "result", "chapter"}
     assert set(claim) == (always | ruled if "rule" in claim else always)
@@ -61,7 +47,7 @@ def test_claim_is_whole_and_its_verdict_is_not_typed(claim, verdicts):
     assert "{" not in verdicts.rule_of(claim)
 
 
-def test_every_rule_has_its_function_and_its_step(verdicts):
+def test_every_rule_has_its_function_and_its_step():
     assert set(verdicts.RULES) == set(RULED)
     made = {step["makes"] for step in STEPS}
     for identity in RULED:
@@ -78,7 +64,8 @@ def test_steps_stand_behind_what_they_need_and_run_scripts_that_exist():
         program, *rest = shlex.split(step["command"])
         assert program in ("python", "motionlab")
         if program == "python":
-            assert (ROOT / rest[0]).is_file()
+            file = rest[1].replace(".", "/") + ".py" if rest[0] == "-m" else rest[0]
+            assert (ROOT / file).is_file()
 
 
 def test_chapters_link_to_claims_that_exist():
@@ -226,7 +213,7 @@ CASES = [
 @pytest.mark.parametrize(
     "case", CASES, ids=[f"{case[0]}-{case[1]}-{i}" for i, case in enumerate(CASES)]
 )
-def test_rule(case, verdicts, tmp_path):
+def test_rule(case, tmp_path):
     identity, wanted, *results = case
     claim = claim_of(identity)
     for name, result in zip(verdicts.results_of(claim), results, strict=True):
@@ -242,7 +229,7 @@ def test_every_rule_can_say_yes_and_no():
         assert {"not", "partly" if identity == "W2-rate" else "reproduced"} <= said, identity
 
 
-def test_a_network_that_says_one_thing_only_has_no_variety(rnn_gan, tmp_path):
+def test_a_network_that_says_one_thing_only_has_no_variety(tmp_path):
     """And one that explodes in many ways has not either."""
     claim = claim_of("W1-variety")
     for ratios, sound in (([0.0] * 6, 1.0), ([0.0] * 6, 0.0)):
@@ -252,13 +239,13 @@ def test_a_network_that_says_one_thing_only_has_no_variety(rnn_gan, tmp_path):
 
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim["id"])
-def test_without_results_all_is_open_and_with_ours_all_is_a_verdict(claim, verdicts, tmp_path):
+def test_without_results_all_is_open_and_with_ours_all_is_a_verdict(claim, tmp_path):
     found = verdicts.judge(claim, tmp_path)
     assert found.verdict == "open" and found.remark
     assert verdicts.judge(claim).verdict in verdicts.VERDICTS
 
 
-def test_edge_of_learning_rates_is_said(rnn_gan):
+def test_edge_of_learning_rates_is_said():
     limits = claim_of("W2-optimiser")["limits"]
     assert "edge" in rnn_gan.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.003")).remark
     assert not rnn_gan.w2_optimiser(limits, optimisers((5, 5, 5), (1, 1, 1), "0.001")).remark
@@ -271,11 +258,11 @@ def test_edge_of_learning_rates_is_said(rnn_gan):
      ((-1e9, 4, 5), (3, 3, 3), "worse"), ((1, 1, 1), (-float("inf"), 0, 0), "better"),
      ((-float("inf"), 0, 0), (-float("inf"), -1, -1), "no different")],
 )  # fmt: skip
-def test_compare(a, b, said, rnn_gan):
+def test_compare(a, b, said):
     assert rnn_gan.compare(a, b, 0.5) == said
 
 
-def test_a_training_that_fell_apart_counts_as_the_worst(rnn_gan):
+def test_a_training_that_fell_apart_counts_as_the_worst():
     ruined = {"seed": 0, "fell apart": True}
     recipe = optimisers((5, 5, 5), (1, 1, 1), "0.001")
     recipe["rows"]["SGD"]["runs"][0] = ruined
@@ -285,7 +272,7 @@ def test_a_training_that_fell_apart_counts_as_the_worst(rnn_gan):
     assert rnn_gan.w2_noise(claim_of("W2-noise")["limits"], {"rows": rows}).verdict == "not"
 
 
-def test_verdicts_are_printed(verdicts, capsys):
+def test_verdicts_are_printed(capsys):
     verdicts.main(["W1", "W10"])
     printed = capsys.readouterr().out
     assert {"W1-variety", "W1-endless", "W10"} <= set(re.findall(r"^(\S+):", printed, re.M))
@@ -298,9 +285,8 @@ def test_verdicts_are_printed(verdicts, capsys):
 @pytest.fixture
 def clone(tmp_path, monkeypatch):
     """A repository without data, weights or results."""
-    (tmp_path / "experiments").mkdir()
-    text = (ROOT / "experiments" / "claims.yaml").read_text(encoding="utf-8")
-    (tmp_path / "experiments" / "claims.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / FILE).parent.mkdir(parents=True)
+    (tmp_path / FILE).write_text((ROOT / FILE).read_text(encoding="utf-8"), encoding="utf-8")
     monkeypatch.chdir(tmp_path / "experiments")  # a folder within will do
     return tmp_path
 
@@ -321,15 +307,15 @@ def test_reproduce_lists_what_is_missing_in_order(clone, capsys):
     Reproduce(("W10",), dry_run=True).run()
     assert commands(capsys) == [
         "motionlab prepare locomotion",
-        "python experiments/sizes.py",
-        "python experiments/verdicts.py W10",
+        "python -m experiments.rnn_gan.sizes",
+        "python -m experiments.claims.verdicts W10",
     ]
     touch(clone, "runs/locomotion.npz")
     Reproduce(("W1", "W8"), dry_run=True).run()
     assert commands(capsys) == [
-        "python experiments/lstm_gmm_samples.py --model lstm-gmm",
-        "python experiments/initial_state.py --model lstm-gmm",
-        "python experiments/verdicts.py W1 W8",
+        "python -m experiments.rnn_gan.samples --model lstm-gmm",
+        "python -m experiments.rnn_gan.initial_state --model lstm-gmm",
+        "python -m experiments.claims.verdicts W1 W8",
     ]
 
 
@@ -340,7 +326,7 @@ def test_reproduce_trains_only_when_asked(clone, capsys):
     shown = commands(capsys)
     assert shown[0] == "motionlab prepare locomotion"
     assert shown[1] == "motionlab train lstm-gmm --preset ship"
-    assert shown[2].startswith("python experiments/ship_weights.py lstm-gmm ")
+    assert shown[2].startswith("python -m experiments.shipping.weights lstm-gmm ")
 
 
 def test_a_training_under_way_is_gone_on_with(clone, capsys):
@@ -371,7 +357,7 @@ def test_reproduce_runs_commands_in_the_root_and_stops_at_the_first_that_fails(c
         {"makes": "results/c.json", "needs": ["b"], "command": "python -c 'raise SystemExit(4)'"},
     ]
     book = {"claims": [{"id": "C1", "result": "c"}], "steps": steps}
-    (clone / "experiments" / "claims.yaml").write_text(yaml.safe_dump(book), encoding="utf-8")
+    (clone / FILE).write_text(yaml.safe_dump(book), encoding="utf-8")
     with pytest.raises(MotionLabError, match="ended with 3"):
         Reproduce(("C1",)).run()
     assert (clone / "a").exists()

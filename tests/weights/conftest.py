@@ -6,10 +6,7 @@ from types import SimpleNamespace
 import pytest
 import torch
 
-
-@pytest.fixture(scope="session")
-def ship_weights(experiment):
-    return experiment("ship_weights")
+from experiments.shipping.weights import ship
 
 
 @pytest.fixture(scope="session")
@@ -39,7 +36,7 @@ def trained(gaits, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def shipped(ship_weights, trained, gaits, tmp_path_factory):
+def shipped(trained, gaits, tmp_path_factory):
     """The same weights, shipped to a folder of their own: tiny.safetensors."""
     folder = tmp_path_factory.mktemp("shipped")
-    return ship_weights.ship("tiny", trained, str(gaits.path), folder, {"temperature": 0.5})
+    return ship("tiny", trained, str(gaits.path), folder, {"temperature": 0.5})

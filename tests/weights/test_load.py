@@ -10,6 +10,9 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 import motionlab
+from experiments.shipping import cards
+from experiments.shipping.starts import candidates, choose
+from experiments.shipping.weights import ship
 from motionlab import contacts, metrics, weights
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import LstmGmm
@@ -33,8 +36,8 @@ def test_shipped_weights_are_ready_to_generate(model):
     assert model.sampling == {"temperature": 0.5}
 
 
-def test_starts_are_states_that_the_rounded_network_reaches(model, ship_weights, gaits):
-    found = ship_weights.choose(ship_weights.candidates(gaits.data))
+def test_starts_are_states_that_the_rounded_network_reaches(model, gaits):
+    found = choose(candidates(gaits.data))
     assert tuple(start.name for start in found) == model.start_names
     clips = gaits.data.clips("val")
     for index, start in enumerate(found):
@@ -149,8 +152,7 @@ def test_card_says_what_the_file_holds(model, shipped, gaits, tmp_path):
     assert motionlab.load(shutil.copy(shipped, tmp_path / "b.safetensors")).hash == model.hash
 
 
-def test_card_says_what_a_training_began_with(model, shipped, experiment, monkeypatch):
-    cards = experiment("cards")
+def test_card_says_what_a_training_began_with(model, shipped, monkeypatch):
     assert "| began with | chance |" in model.card
     made = {**model.about, "name": "lstm-gmm-contacts", "start": model.hash}
     assert " --from WEIGHTS --updates 60" in cards.command_of(made, "gaits")
@@ -160,7 +162,7 @@ def test_card_says_what_a_training_began_with(model, shipped, experiment, monkey
     assert f"| began with | weights of sha256 {model.hash} |" in card
 
 
-def test_other_data_than_those_of_the_training_are_refused(ship_weights, trained, gaits, tmp_path):
+def test_other_data_than_those_of_the_training_are_refused(trained, gaits, tmp_path):
     from motionlab.training import prepared
 
     data = gaits.data
@@ -171,11 +173,11 @@ def test_other_data_than_those_of_the_training_are_refused(ship_weights, trained
     type(data)(data.features, data.lengths, data.names, fewer, data.encoding, data.normalizer,
                digest).save(tmp_path / "fewer.npz")  # fmt: skip
     with pytest.raises(motionlab.MotionLabError, match="was not trained on"):
-        ship_weights.ship("x", trained, str(tmp_path / "fewer.npz"), tmp_path / "out", {})
+        ship("x", trained, str(tmp_path / "fewer.npz"), tmp_path / "out", {})
     assert not (tmp_path / "out").exists()
 
 
-def test_a_dancer_ships_with_starts_and_a_card(ship_weights, tmp_path):
+def test_a_dancer_ships_with_starts_and_a_card(tmp_path):
     """Trained for a second on gaits that pass for a dance at 60 frames a second."""
     from motionlab import datasets
     from motionlab.encodings import Normalizer, RootRelative
@@ -192,7 +194,7 @@ def test_a_dancer_ships_with_starts_and_a_card(ship_weights, tmp_path):
     data.save(tmp_path / "dance.npz")
     preset = PRESETS["aclstm-indian"]["smoke"]
     loop.train(build(data, preset), data, preset, tmp_path, name="aclstm-indian", accelerator="cpu")
-    path = ship_weights.ship(
+    path = ship(
         "aclstm-tiny", tmp_path / "last.safetensors", str(tmp_path / "dance.npz"), tmp_path, {}
     )
     model = motionlab.load(path)
@@ -206,10 +208,10 @@ def test_a_dancer_ships_with_starts_and_a_card(ship_weights, tmp_path):
         assert said in model.card, said
 
 
-def test_starts_are_named_after_what_follows(ship_weights, gaits):
+def test_starts_are_named_after_what_follows(gaits):
     names = [name for name, split in zip(gaits.data.names, gaits.data.splits, strict=True)
              if split == "val"]  # fmt: skip
-    found = ship_weights.candidates(gaits.data)
+    found = candidates(gaits.data)
     assert {start.clip for start in found} == set(range(len(names)))
     for start in found:
         gait = names[start.clip].split("/")[1].split("_")[0]

@@ -9,6 +9,8 @@ import torch
 from safetensors import safe_open
 
 import motionlab
+from experiments.shipping.cards import command_of_game
+from experiments.shipping.refiner import ship
 from motionlab.errors import MotionLabError
 from motionlab.models import Refiner
 from motionlab.training import GAMES, judging
@@ -31,12 +33,11 @@ def played(shipped, gaits, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def refiner_file(experiment, played, shipped, gaits, tmp_path_factory):
+def refiner_file(played, shipped, gaits, tmp_path_factory):
     folder = tmp_path_factory.mktemp("shipped-refiner")
-    script = experiment("ship_refiner")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judging, "UPDATES", 5)
-        return script.ship("tiny-refiner", played, str(shipped), str(gaits.path), folder)
+        return ship("tiny-refiner", played, str(shipped), str(gaits.path), folder)
 
 
 def test_it_loads_and_refines(refiner_file, shipped):
@@ -65,13 +66,12 @@ def test_the_card_says_how_good_it_is_and_how_it_was_made(refiner_file, shipped)
     assert about["generator_hash"] == motionlab.load(shipped).hash
 
 
-def test_what_cannot_be_shipped_is_said(experiment, played, shipped, gaits, tmp_path):
-    script = experiment("ship_refiner")
+def test_what_cannot_be_shipped_is_said(played, shipped, gaits, tmp_path):
     refiner, made = load_weights(played)
     save_weights(tmp_path / "other.safetensors", refiner, made | {"data": "0" * 64})
     with pytest.raises(MotionLabError, match="was not trained on"):
-        script.ship("x", tmp_path / "other.safetensors", str(shipped), str(gaits.path), tmp_path)
+        ship("x", tmp_path / "other.safetensors", str(shipped), str(gaits.path), tmp_path)
     assert not list(tmp_path.glob("x.*"))
     settings = {"preset": vars(GAMES["refiner"]["ship"]) | {"width": 7}, "name": "refiner"}
     with pytest.raises(MotionLabError, match="No preset"):
-        experiment("cards").command_of_game(settings, "lstm-gmm")
+        command_of_game(settings, "lstm-gmm")

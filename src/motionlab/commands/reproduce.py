@@ -13,13 +13,15 @@ from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError
 
+BOOK = Path("experiments", "claims", "claims.yaml")  # in a clone
+
 
 @dataclass
 class Reproduce:
     """Run what claims of the papers need, in order, and print the verdicts; in a clone of the book.
 
-    Which commands these are stands in experiments/claims.yaml. Data and weights that are there are
-    used; results are made anew.
+    Which commands these are stands in experiments/claims/claims.yaml. Data and weights that are
+    there are used; results are made anew.
     """
 
     claims: Positional[Annotated[tuple[str, ...], arg(metavar="ID")]]
@@ -37,7 +39,7 @@ class Reproduce:
             print(f"{step['command']}{hours}", flush=True)
             if not self.dry_run:
                 _call(step["command"], root)
-        verdicts = shlex.join(["python", "experiments/verdicts.py", *self.claims])
+        verdicts = shlex.join(["python", "-m", "experiments.claims.verdicts", *self.claims])
         print(verdicts, flush=True)
         if not self.dry_run:
             _call(verdicts, root)
@@ -69,7 +71,7 @@ def _read(root: Path, names: tuple[str, ...]) -> tuple[set[str], list[dict]]:
         import yaml
     except ModuleNotFoundError as error:
         raise MotionLabError("reproduce needs pyyaml: pip install 'motionlab[book]'.") from error
-    book = yaml.safe_load((root / "experiments" / "claims.yaml").read_text(encoding="utf-8"))
+    book = yaml.safe_load((root / BOOK).read_text(encoding="utf-8"))
     wanted: set[str] = set()
     for name in names:
         found = [c for c in book["claims"] if c["id"] == name or c["id"].startswith(f"{name}-")]
@@ -88,7 +90,7 @@ def _read(root: Path, names: tuple[str, ...]) -> tuple[set[str], list[dict]]:
 def _root() -> Path:
     """The repository that we are in."""
     for folder in (Path.cwd(), *Path.cwd().parents):
-        if (folder / "experiments" / "claims.yaml").is_file():
+        if (folder / BOOK).is_file():
             return folder
     raise MotionLabError(
         f"{Path.cwd()}: is not in a clone of the book, which has the experiments; go there first."

@@ -1,7 +1,7 @@
 """How a body moves over a gait cycle: Fourier coefficients fitted to real walks and runs.
 
-The coefficients in gaits.json come from experiments/fit_gaits.py. They are fitted to clips of one
-actor ("Male1"), ACCAD Motion Lab, The Ohio State University, licensed CC BY 3.0.
+The coefficients in gaits.json come from experiments/data/fit_gaits.py. They are fitted to clips of
+one actor ("Male1"), ACCAD Motion Lab, The Ohio State University, licensed CC BY 3.0.
 
 A cycle has phase 0 at the left foot's strike and 1 at its next. Lengths are in leg lengths, speeds
 are Froude speeds v / sqrt(g leg): bodies of different size move alike at equal Froude speed.

@@ -13,7 +13,7 @@ from torch import Tensor
 from ..errors import EncodingError
 from ..skeleton import Skeleton
 
-_FILE = Path(__file__).with_name("mean_pose.json")  # written by experiments/fit_mean_pose.py
+_FILE = Path(__file__).with_name("mean_pose.json")  # written by experiments/data/fit_mean_pose.py
 
 
 # Kept in an encoding: one made while sampling must serve when training.

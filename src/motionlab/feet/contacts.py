@@ -8,7 +8,7 @@ Four channels, in this order: left heel, left toe, right heel, right toe. The he
 * ``"speed-height"``: STRNN, section 4.2.3. Slow, and low as well. The paper gives no numbers. Ours:
   the same speed, and 4 cm, below which 99 % of the resting feet of real walks and runs lie.
 
-``experiments/contact_rules.py`` measures both against exact labels and on real clips.
+``experiments/data/contact_rules.py`` measures both against exact labels and on real clips.
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""What the papers claim, our rules, the verdicts; assumptions and deviations."""

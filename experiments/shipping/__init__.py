@@ -1,0 +1,1 @@
+"""Trained weights made ready to ship: rounded, with starts and a card."""

@@ -1,0 +1,268 @@
+"""Model cards: what shipped weights are, how they were made, and whose data are behind them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shlex
+from dataclasses import asdict
+
+import torch
+from torch import nn
+
+import motionlab
+from motionlab import MotionLabError, datasets, weights
+from motionlab.training import GAMES, PRESETS, Prepared
+from motionlab.training.games import GamePreset
+
+from ..common import record
+
+PAPERS = {
+    "LstmGmm": """\
+A recurrent mixture density network (LstmGmm; Wang, Chai and Xia, *Combining Recurrent Neural Networks
+and Adversarial Training for Human Motion Synthesis and Control*, 2021, section 4.1) that goes on with
+walking and running, {fps:g} frames a second, on the canonical skeleton of motionlab: joint angles, steps
+over the ground{toes}. It is no release of the authors of the paper.""",
+    "AcLstm": """\
+An auto-conditioned recurrent network (AcLstm; Zhou and others, *Auto-Conditioned Recurrent Networks for
+Extended Complex Human Motion Synthesis*, 2018) that goes on with motion of the style in its name,
+{fps:g} frames a second, as points in space. It is no release of the authors of the paper.""",
+}
+LIMITS = {
+    "LstmGmm": """\
+Nothing steers it: it goes where it likes. It knows level ground, and no other body than the canonical
+one. Feet slide more than in its data; `motionlab evaluate {name}` measures by how much.""",
+    "AcLstm": """\
+Nothing steers it, and it draws no lots: one start has one future. It has seen a few minutes of a few
+people, and nothing keeps a bone's length. How long its dances last stands in
+`results/dances_rollouts.json` and in the book.""",
+}
+MEASURES = {
+    "foot skate (cm/s)": "foot skate, cm/s",
+    "jerk (m/s³)": "jerk, m/s³",
+    "frechet": "Fréchet distance",
+    "critic": "critic's accuracy",
+}
+NO_PRESET = "No preset of this version has the settings of these weights."
+
+
+def command_of(made: dict, source: str) -> str:
+    """The command line that makes such weights again."""
+    trained = type(PRESETS[made["name"]]["ship"])(**made["preset"])
+    may_differ = ("updates", "learning_rate", "seed")
+    for title, preset in PRESETS[made["name"]].items():
+        differ = [key for key, value in asdict(preset).items() if getattr(trained, key) != value]
+        if set(differ) <= set(may_differ):
+            options = [f"--{key.replace('_', '-')} {getattr(trained, key)}" for key in differ]
+            if made.get("start"):
+                options.insert(0, f"--from {shipped_as(made['start']) or 'WEIGHTS'}")
+            command = f"motionlab train {made['name']} --preset {title} --data {source}"
+            return " ".join([command, *options])
+    raise MotionLabError(NO_PRESET)
+
+
+def command_of_game(made: dict, generator: str) -> str:
+    """The command line that makes such a refiner again."""
+    trained = GamePreset(**made["preset"])
+    for title, preset in GAMES[made["name"]].items():
+        differ = [key for key, value in asdict(preset).items() if getattr(trained, key) != value]
+        if set(differ) <= {"steps", "seed"}:
+            options = {"steps": "--updates", "seed": "--seed"}
+            more = [f"{options[key]} {getattr(trained, key)}" for key in differ]
+            if generator != made["name"].replace("refiner", "lstm-gmm"):
+                more.insert(0, f"--from {generator}")
+            return " ".join([f"motionlab train {made['name']} --preset {title}", *more])
+    raise MotionLabError(NO_PRESET)
+
+
+def shipped_as(sha256: str) -> str | None:
+    """Name of the shipped weights of this hash, if there are such."""
+    names = {hashlib.sha256(weights.find(n).read_bytes()).hexdigest(): n for n in weights.names()}
+    return names.get(sha256)
+
+
+def card(
+    about: dict,
+    model: nn.Module,
+    size: int,
+    clips: int,
+    minutes: float,
+    sources: str,
+    commercial: bool,
+    remark: str = "",
+) -> str:
+    """A generator's card, in Markdown; clips, minutes: of training motion; remark: on its limits."""
+    kind, name = type(model).__name__, about["name"]
+    toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
+    begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
+    mirrored = ", half of them mirror images" if kind == "LstmGmm" else ""
+    sampling = ", ".join(f"{key} {value:g}" for key, value in about["sampling"].items())
+    return f"""\
+# {name}
+
+{PAPERS[kind].format(fps=model.fps, toes=toes)}
+
+```python
+model = motionlab.load("{name}")
+features = model.generate(300, model.starts[0], **model.sampling)
+motion = model.encoding.to_motion(features[0])
+```
+
+| | |
+|---|---|
+{_made_by(about)}
+| updates | {about["update"]}{", the best of validation" if kind == "LstmGmm" else ""} |
+| seed | {about["preset"]["seed"]} |
+| began with | {begun} |
+| precision of the training | {about["precision"]} |
+| time until then | {about["seconds"] / 3600:.2f} h |
+| data | `{about["data_name"]}`, sha256 {about["data"]} |
+| training clips | {clips}, {minutes:.1f} minutes{mirrored} |
+| size | {_parameters(model)}, {size / 2**20:.1f} MiB |
+{_held_out(about)}
+| sampling that suits it | {sampling or "as learned"} |
+| starts | {"; ".join(about["starts"])} |
+
+{_settings(about)}
+
+## Meant for
+
+Learning how such networks work, comparing with them, starting a training of your own (`motionlab
+train {about["model"]} --from {name}`). Not for judging how a person moves, nor for telling persons
+apart.
+
+## What it can't do
+
+{LIMITS[kind].format(name=name)}{remark and f" {remark}"}
+
+{_licence(sources, commercial)}
+"""
+
+
+def refiner_card(about: dict, model: nn.Module, size: int, sources: str, commercial: bool) -> str:
+    """A refiner's card, in Markdown."""
+    name, generator = about["name"], about["generator"]
+    return f"""\
+# {name}
+
+A recurrent network (Refiner; Wang, Chai and Xia, *Combining Recurrent Neural Networks and Adversarial
+Training for Human Motion Synthesis and Control*, 2021, section 4.2) that corrects motion of
+`{generator}`, frame by frame and never looking ahead, so that its feet slide less. It is no release of
+the authors of the paper, and its training differs from theirs: see the settings.
+
+```python
+model, refiner = motionlab.load("{generator}"), motionlab.load("{name}")
+features = refiner(model.generate(300, model.starts[0], **model.sampling))
+motion = model.encoding.to_motion(features[0])
+```
+
+| | |
+|---|---|
+{_made_by(about)}
+| refines | `{generator}`, sha256 {about["generator_hash"]} |
+| step | {about["step"]} of {about["preset"]["steps"]}, chosen by `motionlab.training.judging` |
+| seed | {about["preset"]["seed"]} |
+| time until then | {about["seconds"] / 60:.0f} minutes on one core |
+| data | `{about["data_name"]}`, sha256 {about["data"]} |
+| size | {_parameters(model)}, {size / 2**10:.0f} KiB |
+
+{_judged(about)}
+
+{_settings(about)}
+
+## Meant for
+
+Learning how such networks work, and motion of `{generator}` whose feet hold the ground better. Not for
+motion of other generators, which it has not seen.
+
+## What it can't do
+
+It looks at what has been, not at what comes, and corrects by centimetres: feet still slide, by less.
+`motionlab sample --lock-feet` holds them. It knows level ground, and no other body than the canonical one.
+
+{_licence(sources, commercial)}
+"""
+
+
+def _made_by(about: dict) -> str:
+    """Rows on what made the weights."""
+    return f"""\
+| made by | `{about["command"]}` |
+| and | `{shlex.join(record.command())}` |
+| motionlab | {motionlab.__version__}, torch {torch.__version__} |"""
+
+
+def _parameters(model: nn.Module) -> str:
+    count = sum(parameter.numel() for parameter in model.parameters())
+    return f"{count:,} parameters in half precision"
+
+
+def _settings(about: dict) -> str:
+    return f"""\
+## Settings of the training
+
+```json
+{json.dumps(about["preset"], indent=1)}
+```"""
+
+
+def _licence(sources: str, commercial: bool) -> str:
+    return f"""\
+## Licence
+
+{"The licences of its data allow commercial use." if commercial else "Not for commercial use: some of its data are not."}
+Who passes these weights on names the sources:
+
+{sources}"""
+
+
+def _held_out(about: dict) -> str:
+    """Rows on how good it is on validation clips, and on what rounding costs."""
+    if "log_likelihood" not in about:
+        full, half = (about["validation loss"][kind] for kind in ("full", "half"))
+        return (
+            f"| held-out loss | {half:.4f}, mean squared error of a channel in deviations |\n"
+            f"| what rounding costs | {half - full:.5f} |"
+        )
+    full, half = (about["log_likelihood"][kind] for kind in ("full", "half"))
+    return (
+        f"| held-out log-likelihood | {half['value']:.3f} nats a frame [{half['low']:.3f}, "
+        f"{half['high']:.3f}] over {half['clips']} validation clips |\n"
+        f"| what rounding costs | {full['value'] - half['value']:.4f} nats a frame |"
+    )
+
+
+def _judged(about: dict) -> str:
+    """What becomes of motion, by the rounded refiner and by it as it was trained."""
+    full, half = about["judged"]["full"], about["judged"]["half"]
+    real = about["real"] | {"frechet": 0.0, "critic": 0.5}
+    rows = "\n".join(
+        f"| {title} | {real[key]:.3g} | {about['unrefined'][key]:.3g} | {half[key]:.3g} | "
+        f"{full[key]:.3g} |"
+        for key, title in MEASURES.items()
+    )
+    return f"""\
+On validation clips and samples of 10 s that go on from them:
+
+| | real | unrefined | refined | before rounding |
+|---|---|---|---|---|
+{rows}
+
+Half of the roots end within {100 * half["root (m)"]:.1f} cm of where they would have after 10 s."""
+
+
+def licences(data: Prepared) -> tuple[str, bool]:
+    """The sources of the training clips, and whether all may be used commercially."""
+    frames: dict[str, int] = {}
+    rows = zip(data.names, data.splits, data.lengths.tolist(), strict=True)
+    for name, split, length in rows:
+        if split == "train":
+            source = name.split("/")[0]
+            frames[source] = frames.get(source, 0) + length
+    about = {source: datasets.info(source) for source in frames}
+    lines = [
+        f"* {about[source].title} (`{source}`), {100 * count / sum(frames.values()):.1f} % of the "
+        f"frames: {about[source].licence}. {about[source].citation}"
+        for source, count in sorted(frames.items(), key=lambda item: -item[1])
+    ]
+    return "\n".join(lines), all(info.commercial for info in about.values())

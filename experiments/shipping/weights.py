@@ -1,0 +1,140 @@
+"""Make shipped weights of a training's: writes src/motionlab/weights/NAME.safetensors and NAME.md.
+
+    python -m experiments.shipping.weights lstm-gmm runs/lstm-gmm-ship/best.safetensors \
+        [--data locomotion] [--temperature 0.8] [--component-temperature 1] [--noise 0] [--folder ...]
+
+Rounds the parameters to half precision, adds states to start from, of validation clips, fits the
+temperature of a mixture on these clips unless one is given, and says on the card what the weights
+are and what rounding costs. No number on the card is typed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+import motionlab
+from motionlab import MotionLabError
+from motionlab.models import LstmGmm
+from motionlab.training import PRESETS, Prepared
+from motionlab.training.checkpoints import load_weights, save_weights, write_whole
+from motionlab.training.evaluation import likelihood
+from motionlab.training.finish import fit_temperature
+
+from ..common import record
+from .cards import card, command_of, licences
+from .starts import OBSERVED, candidates, choose, of_dances
+
+FOLDER = Path(motionlab.__file__).parent / "weights"
+
+
+def main(arguments: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name")
+    parser.add_argument("weights", type=Path)
+    parser.add_argument("--data", help="name, folder or prepared file; as its training if left out")
+    parser.add_argument("--folder", type=Path, default=FOLDER)
+    parser.add_argument("--temperature", type=float, help="for samples, if not the one that fits")
+    for option in ("component-temperature", "noise"):
+        parser.add_argument(f"--{option}", type=float, help="for samples, if others than 1, 0")
+    parser.add_argument("--remark", default="", help="what else it can't do, for the card")
+    chosen = parser.parse_args(arguments)
+    sampling = {
+        key: getattr(chosen, key) for key in ("temperature", "component_temperature", "noise")
+    }
+    sampling = {key: value for key, value in sampling.items() if value is not None}
+    style = chosen.name.rpartition("-")[2] if chosen.name.startswith("aclstm") else "locomotion"
+    path = ship(
+        chosen.name, chosen.weights, chosen.data or style, chosen.folder, sampling, chosen.remark
+    )
+    print(path.with_suffix(".md").read_text(encoding="utf-8"))
+
+
+def ship(
+    name: str, file: Path, source: str, folder: Path, sampling: dict[str, float], remark: str = ""
+) -> Path:
+    """Write NAME.safetensors and NAME.md; returns the path of the weights."""
+    data, model, made = with_data(file, source)
+    licence = licences(data)  # of an unknown source: fails before anything is written
+    halved = rounded(model)
+    ready = mixture if isinstance(model, LstmGmm) else dancer
+    before, starts, sampling, facts = ready(model, halved, data, made, sampling)
+    with torch.no_grad():  # by the network as it will be
+        state = halved.observe(before)
+        halved.generate(2, state, **sampling)  # refuses what makes no sense
+    about = {
+        **{key: made[key] for key in ("preset", "data", "precision", "update", "seconds")},
+        "start": made.get("start"),
+        "name": name,
+        "model": made["name"],
+        "command": command_of(made, source),
+        "data_name": source,
+        "starts": starts,
+        "sampling": sampling,
+        **facts,
+    }
+    path = folder / f"{name}.safetensors"
+    save_weights(path, halved, about, starts=state, half=True)
+    clips = data.clips("train")
+    minutes = sum(map(len, clips)) / data.encoding.fps / 60
+    text = card(about, halved, path.stat().st_size, len(clips), minutes, *licence, remark)
+    write_whole(path.with_suffix(".md"), lambda stream: stream.write(text.encode()))
+    return path
+
+
+def with_data(file: Path, source: str) -> tuple[Prepared, nn.Module, dict]:
+    """The data that weights were trained on, the weights, and what is said of them."""
+    data = Prepared.find(source)
+    model, made = load_weights(file)
+    if made["data"] != data.hash:
+        raise MotionLabError(f"{file}: was not trained on {source}; name the data that it was.")
+    return data, model, made
+
+
+def rounded(model: nn.Module) -> nn.Module:
+    """A copy, for use, with parameters as half precision has them."""
+    copied = copy.deepcopy(model).eval()
+    for parameter in copied.parameters():
+        parameter.data = parameter.half().float()
+    return copied
+
+
+Ready = tuple[Tensor, list[str], dict[str, float], dict]
+
+
+def mixture(
+    model: nn.Module, halved: nn.Module, data: Prepared, made: dict, sampling: dict
+) -> Ready:
+    """Frames before each start (starts, frames, dim), names, sampling, and what else to know."""
+    clips = data.matching(model.encoding).clips("val")
+    if "temperature" not in sampling:
+        sampling = {"temperature": fit_temperature(halved, clips, **sampling)} | sampling
+    starts, observed = choose(candidates(data)), round(OBSERVED * model.fps)
+    before = torch.stack([clips[s.clip][s.frame - observed : s.frame] for s in starts])
+    nats = {"full": likelihood(model, clips), "half": likelihood(halved, clips)}
+    facts = {"log_likelihood": {kind: found._asdict() for kind, found in nats.items()}}
+    return before, [start.name for start in starts], sampling, facts
+
+
+@torch.no_grad()
+def dancer(
+    model: nn.Module, halved: nn.Module, data: Prepared, made: dict, sampling: dict
+) -> Ready:
+    """The same of a network that says frames, not what is likely."""
+    preset = type(PRESETS[made["name"]]["ship"])(**made["preset"])
+    windows = torch.cat(preset.windows(data, "val").tiles(1_000))
+    extras = preset.judged(windows.shape)
+    loss = {
+        "full": model.loss(windows, **extras).item(),
+        "half": halved.loss(windows, **extras).item(),
+    }
+    before, names = of_dances(data, model.fps)
+    return before, names, sampling, {"validation loss": loss}
+
+
+if __name__ == "__main__":
+    record.run(main)
