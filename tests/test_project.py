@@ -80,11 +80,31 @@ def test_version_is_the_same_everywhere():
 
 def test_map_in_contributing_is_the_tree():
     block = re.search(r"```text\n.*?```", CONTRIBUTING, re.DOTALL)[0]
-    named = set(re.findall(r"^([a-z]+)/", block, re.MULTILINE))
-    inner = set(re.findall(r"^  ([a-z]+)/", block, re.MULTILINE))
+    named: dict[tuple[str, ...], set[str]] = {}  # folders of the map, with those below them
+    inner: set[str] = set()
+    for below, folder in re.findall(r"^(  )?([a-z_/]+)/ ", block, re.MULTILINE):
+        if not below:
+            inner = named[tuple(folder.split("/"))] = set()
+        else:
+            inner.add(folder)
     folders = {p.relative_to(ROOT).parts for p in tracked()}
-    assert named == {f[0] for f in folders if len(f) > 1 and not f[0].startswith(".")}
-    assert inner == {f[2] for f in folders if f[:2] == ("src", "motionlab") and len(f) > 3}
+    outer = {f[0] for f in folders if len(f) > 1 and not f[0].startswith(".")}
+    assert {folder[0] for folder in named} == outer
+    for folder in (("experiments",), ("src", "motionlab")):
+        deep = len(folder)
+        there = {f[deep] for f in folders if f[:deep] == folder and len(f) > deep + 1}
+        assert named[folder] == there
+
+
+SCRIPTS = [path for path in sorted((ROOT / "experiments").rglob("*.py"))
+           if '__name__ == "__main__"' in path.read_text(encoding="utf-8")]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: f"{p.parent.name}-{p.stem}")
+def test_a_script_says_how_it_is_run(path):
+    module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+    assert re.search(rf"^ *(\w+=\w+ )?python -m {module}( |$)", said, re.MULTILINE)
 
 
 def module_of(path: Path) -> str:
