@@ -1,15 +1,17 @@
-"""What tests share: real clips, where there are any."""
+"""What tests share: real clips, where there are any; and at the end, what was not tested and why."""
 
 from __future__ import annotations
 
 import os
 import zipfile
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-if folder := os.environ.get("MOTIONLAB_DATA"):  # some tests run elsewhere
-    os.environ["MOTIONLAB_DATA"] = str(Path(folder).resolve())
+DATA = os.environ.get("MOTIONLAB_DATA")
+if DATA:  # some tests run elsewhere
+    os.environ["MOTIONLAB_DATA"] = DATA = str(Path(DATA).resolve())
 
 # Two processes with two threads each take turns on two cores, and wait for each other: half as fast.
 if "PYTEST_XDIST_WORKER" in os.environ:
@@ -19,15 +21,34 @@ SOURCES = ("accad", "aclstm-cmu", "bandai-actions", "bandai-locomotion", "cmu")
 
 
 @pytest.fixture(scope="session")
-def real_clips() -> dict[str, dict[str, bytes]]:
+def recorded_clips() -> Path:
+    """The folder of recorded clips; without MOTIONLAB_DATA the test is skipped."""
+    if not DATA:
+        pytest.skip("no recorded clips: let MOTIONLAB_DATA name their folder (README.md, Data)")
+    return Path(DATA)
+
+
+@pytest.fixture(scope="session")
+def real_clips(recorded_clips) -> dict[str, dict[str, bytes]]:
     """Three clips of each source, by their path: the first, a middle one, the last.
 
-    Without MOTIONLAB_DATA the test is skipped; with it, a source that is not there is a failure.
+    A source that is not there is a failure.
     """
-    folder = os.environ.get("MOTIONLAB_DATA")
-    if not folder:
-        pytest.skip("MOTIONLAB_DATA is not set: no real clips")
-    return {source: _sample(Path(folder), source) for source in SOURCES}
+    return {source: _sample(recorded_clips, source) for source in SOURCES}
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """Say what was skipped and how to have it: a skip that nobody sees is a test that nobody has."""
+    reasons: Counter[str] = Counter()
+    for report in terminalreporter.stats.get("skipped", []):
+        reason = report.longrepr[2].removeprefix("Skipped: ")
+        if reason.startswith("could not import"):
+            reason = f"{reason.split(':')[0]}: pip install -r requirements-lock.txt"
+        reasons[reason] += 1
+    if reasons:
+        terminalreporter.section("not tested here, and how to have it")
+    for reason, count in reasons.most_common():
+        terminalreporter.write_line(f"{count:4} x  {reason}")
 
 
 def _sample(folder: Path, source: str) -> dict[str, bytes]:

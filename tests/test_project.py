@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
 from itertools import chain
 from pathlib import Path
@@ -35,13 +36,13 @@ GROUPS = [
 def tracked(*under: str) -> list[Path]:
     """Files that git keeps or would keep: not what .gitignore names."""
     if shutil.which("git") is None:
-        pytest.skip("no git on this machine")
+        pytest.skip("no git on this machine: apt-get install git")
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", *under],
         cwd=ROOT, capture_output=True, text=True, encoding="utf-8",
     )  # fmt: skip
     if listed.returncode:
-        pytest.skip("not a git checkout")
+        pytest.skip("not a git checkout: clone the repository instead of unpacking an archive")
     return [ROOT / line for line in listed.stdout.splitlines() if (ROOT / line).exists()]
 
 
@@ -192,6 +193,39 @@ def test_a_circle_is_seen(tmp_path, monkeypatch):
     (tmp_path / "b.py").write_text("from motionlab import a\n")
     with pytest.raises(pytest.fail.Exception, match=r"motionlab\.a"):
         test_no_circle_of_modules()
+
+
+def test_import_loads_torch_and_nothing_else_that_takes_its_time():
+    """roma loads torch's compiler, which takes as long as torch."""
+    heavy = {
+        "roma",
+        "torch._dynamo",
+        "pandas",
+        "scipy",
+        "matplotlib",
+        "anywidget",
+        "pyvista",
+        "tyro",
+    }
+    code = "import sys, motionlab; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not heavy & set(run.stdout.split())
+
+
+def test_what_was_skipped_is_told_with_the_remedy(pytestconfig):
+    (plugin,) = {
+        p for p in pytestconfig.pluginmanager.get_plugins()
+        if Path(getattr(p, "__file__", None) or ".") == ROOT / "tests" / "conftest.py"
+    }  # fmt: skip
+    skip = lambda reason: SimpleNamespace(longrepr=("test.py", 1, f"Skipped: {reason}"))
+    said = []
+    plugin.pytest_terminal_summary(SimpleNamespace(
+        stats={"skipped": [skip("no Chromium: install it")] * 2 + [skip("could not import 'x': no")]},
+        section=said.append, write_line=said.append,
+    ))  # fmt: skip
+    assert said[0].startswith("not tested here")
+    assert said[1].split(maxsplit=2) == ["2", "x", "no Chromium: install it"]
+    assert "'x': pip install" in said[2]
 
 
 def public_modules() -> set[str]:

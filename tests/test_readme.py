@@ -34,7 +34,9 @@ def test_the_examples_run(tmp_path, monkeypatch, capsys):
     assert (written.positions()[::2] - names["mirrored"].positions()).abs().max() < 1e-4
 
 
-@pytest.mark.skipif(shutil.which("make") is None, reason="no make on this machine")
+@pytest.mark.skipif(
+    shutil.which("make") is None, reason="no make on this machine: apt-get install make"
+)
 def test_make_knows_the_commands():
     targets = re.findall(r"^make (\w+)", "\n".join(blocks("sh")), re.MULTILINE)
     assert targets == ["book", "test"]

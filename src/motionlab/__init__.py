@@ -1,12 +1,18 @@
 """motionlab: recurrent human motion synthesis, rebuilt on real motion capture."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from .errors import MotionLabError
-from .io.bvh import read_bvh, write_bvh
-from .io.gltf import write_gltf
 from .kinematics import forward_kinematics
 from .motion import Motion, concatenate
 from .skeleton import Skeleton
 from .version import __version__ as __version__
+
+if TYPE_CHECKING:
+    from .io import read_bvh, write_bvh, write_gltf
+    from .viewer import show
+    from .weights import load
 
 __all__ = [
     "Motion",
@@ -18,6 +24,7 @@ __all__ = [
     "encodings",
     "forward_kinematics",
     "ik",
+    "io",
     "load",
     "metrics",
     "read_bvh",
@@ -26,6 +33,15 @@ __all__ = [
     "write_bvh",
     "write_gltf",
 ]
+# Imported when first used, so that `import motionlab` takes hardly longer than `import torch`.
+_MODULES = ("contacts", "datasets", "encodings", "ik", "io", "metrics", "viewer")
+_FUNCTIONS = {
+    "load": ".weights",
+    "read_bvh": ".io",
+    "show": ".viewer",
+    "write_bvh": ".io",
+    "write_gltf": ".io",
+}
 
 
 def __dir__() -> list[str]:
@@ -33,17 +49,8 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str):
-    # Imported when first used: reading a clip needs none of them.
-    if name in ("contacts", "datasets", "encodings", "ik", "metrics", "viewer"):
-        import importlib
-
-        return importlib.import_module(f".{name}", __name__)
-    if name == "show":
-        from .viewer import show
-
-        return show
-    if name == "load":
-        from .weights import load
-
-        return load
+    if name in _MODULES:
+        return import_module(f".{name}", __name__)
+    if name in _FUNCTIONS:
+        return getattr(import_module(_FUNCTIONS[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

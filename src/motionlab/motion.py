@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import roma
 import torch
 from torch import Tensor
 
@@ -286,5 +285,7 @@ def _slerp(a: Tensor, b: Tensor, part: Tensor) -> Tensor:
 
     a, b : (..., 3, 3); part : broadcasts with (...), from 0 to 1.
     """
+    import roma  # loads torch's compiler, which takes as long as the rest of torch
+
     turn = roma.rotmat_to_rotvec(a.mT @ b)
     return a @ roma.rotvec_to_rotmat(turn * part[..., None])

@@ -255,7 +255,7 @@ def test_from_folder_that_is_empty_or_absent(tmp_path):
 # -- the real clips -------------------------------------------------------------------------------
 
 
-@pytest.mark.skipif(not os.environ.get("MOTIONLAB_DATA"), reason="MOTIONLAB_DATA is not set")
+@pytest.mark.usefixtures("recorded_clips")
 def test_real_examples(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     motions = datasets.load("examples", download=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import threading
 from dataclasses import replace
 from importlib.resources import files
@@ -17,9 +16,7 @@ from motionlab import Skeleton, datasets
 from motionlab.datasets import cache, loader, locomotion, registry
 from motionlab.errors import DataError
 
-needs_data = pytest.mark.skipif(
-    not os.environ.get("MOTIONLAB_DATA"), reason="MOTIONLAB_DATA is not set"
-)
+needs_data = pytest.mark.usefixtures("recorded_clips")
 SOURCES = {"accad": 38, "bandai-locomotion": 1067, "cmu": 3}
 CANONICAL, PARTS = Skeleton.canonical(), ("hand", "foot", "toes")
 RESULTS = Path(__file__).parents[2] / "results"

@@ -51,7 +51,10 @@ def test_what_is_no_path(path):
         read_bvh(path)
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root reads all files")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0,
+    reason="root reads all files: run the tests as another user",
+)
 def test_file_without_read_permission(tmp_path):
     path = tmp_path / "clip.bvh"
     path.write_text(corpus.PLAIN, encoding="utf-8")

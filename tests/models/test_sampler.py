@@ -20,7 +20,9 @@ OPTIONS = [
     {"noise": 0.1},
     {"temperature": 0.7, "component_temperature": 3.0, "noise": 0.05},
 ]
-rounds = pytest.mark.skipif(not can_round(torch.zeros(1)), reason="no rounded products here")
+rounds = pytest.mark.skipif(
+    not can_round(torch.zeros(1)), reason="no products with rounded weights: needs an x86 processor"
+)
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["contacts", "plain"])

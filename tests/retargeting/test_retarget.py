@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import pytest
@@ -322,7 +321,7 @@ CLIPS = [
 ]
 
 
-@pytest.mark.skipif(not os.environ.get("MOTIONLAB_DATA"), reason="MOTIONLAB_DATA is not set")
+@pytest.mark.usefixtures("recorded_clips")
 @pytest.mark.parametrize(("source", "name"), CLIPS)
 def test_locomotion_stays_close_to_its_source(source, name):
     motion = datasets.load(source, clips=[name], download=False)[0].resample(30)

@@ -287,7 +287,9 @@ def test_what_a_training_began_with_is_kept_and_must_be_repeated(train, smoke, t
     train(tmp_path / "first", preset)
 
 
-@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="nothing tells what is mapped")
+@pytest.mark.skipif(
+    not Path("/proc/self/maps").exists(), reason="nothing tells what is mapped: needs Linux"
+)
 def test_what_was_read_does_not_hold_its_file(train, smoke, tmp_path):
     """Windows refuses to replace a file that is mapped into memory."""
     train(tmp_path, smoke(updates=1, decay=0))

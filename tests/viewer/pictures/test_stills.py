@@ -40,7 +40,7 @@ def stroll(frames: int = 24, speed: float = 1.2, contacts: bool = False) -> Moti
 def _vtk_or_skip(request):
     backend = getattr(request.node, "callspec", None)
     if backend and backend.params.get("backend") == "vtk" and probe_.why_not():
-        pytest.skip("VTK cannot render here")
+        pytest.skip("VTK cannot render here: apt-get install libegl1 libgl1-mesa-dri libosmesa6")
 
 
 def solid(image: Image.Image) -> np.ndarray:
@@ -70,7 +70,7 @@ def test_a_ball_is_drawn_where_the_camera_projects_it(backend, perspective):
 
 def test_both_painters_agree():
     if probe_.why_not():
-        pytest.skip("VTK cannot render here")
+        pytest.skip("VTK cannot render here: apt-get install libegl1 libgl1-mesa-dri libosmesa6")
     one, other = (solid(still(stroll(), 5, backend=backend)) for backend in BACKENDS)
     assert (one & other).sum() / (one | other).sum() > 0.94
 
