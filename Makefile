@@ -1,5 +1,6 @@
 # make book   build the book into book/_build/html        make lint    ruff, notebooks too
-# make test   run all tests                               make clean   remove what these made
+#             (executes what changed)                     make clean   remove what these made
+# make test   run all tests
 #
 # With no active environment (venv or conda) a target first makes .venv from requirements-lock.txt.
 # A second run installs nothing and needs no network. Without make: README.md, "No `make`?".

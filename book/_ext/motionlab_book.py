@@ -1,15 +1,17 @@
-"""What the book needs of Sphinx beyond its configuration: buttons, scripts, the time budget."""
+"""What the book needs of Sphinx beyond its configuration: buttons, scripts, the record of the build."""
 
-import os
+import json
+import shutil
 from pathlib import Path
 
+from docutils import nodes
 from sphinx.application import Sphinx
-from sphinx.util import logging
+from sphinx.util.docutils import SphinxDirective
 
 from motionlab.viewer import bundle_path
 from motionlab.viewer.live.scene_page import write_viewer
 
-CHAPTER_SECONDS = 150
+EXECUTED = Path(__file__).resolve().parents[1] / "_build" / "executed"  # by book/chapters.py
 
 # Search reads each found page for an excerpt; browsers forbid that to a page opened from disk.
 SEARCH_FROM_DISK = (
@@ -28,14 +30,6 @@ def drop_buttons_without_repository(app: Sphinx, config) -> None:
     options["use_source_button"] = known
 
 
-def take_weights(app: Sphinx, config) -> None:
-    """Chapters leave the weights of networks that run in the page among the book's scripts."""
-    static = Path(app.outdir) / "_static"
-    for old in static.glob("motionlab-weights-*.js"):
-        old.unlink()
-    os.environ["MOTIONLAB_SCRIPTS"] = str(static)
-
-
 def add_player(app: Sphinx, pagename, templatename, context, doctree) -> None:
     """Load the one player script on the pages that hold a player."""
     body = context.get("body", "")
@@ -44,28 +38,51 @@ def add_player(app: Sphinx, pagename, templatename, context, doctree) -> None:
 
 
 def copy_scripts(app: Sphinx, error) -> None:
-    """One player and one viewer of scenes for the whole book."""
+    """One player and one viewer of scenes for the whole book; weights that chapters left for pages."""
     if error is None and app.builder.format == "html":
         static = Path(app.outdir) / "_static"
+        for old in static.glob("motionlab-weights-*.js"):
+            old.unlink()
+        for script in EXECUTED.glob("*/scripts/*.js"):
+            shutil.copyfile(script, static / script.name)
         (static / "motionlab-player.js").write_bytes(bundle_path().read_bytes())
         write_viewer(static)
 
 
-def check_time(app: Sphinx, env) -> None:
-    """A chapter that takes too long to execute fails the (strict) build."""
-    for page, data in env.nb_metadata.items():
-        seconds = data.get("exec_data", {}).get("runtime") or 0
-        if seconds > CHAPTER_SECONDS:
-            logging.getLogger(__name__).warning(
-                "%s took %.0f s; a chapter has %d s", page, seconds, CHAPTER_SECONDS, location=page
+class BuildRecord(SphinxDirective):
+    """A table of what was executed for this book, and what it cost."""
+
+    def run(self) -> list[nodes.Node]:
+        rows = [("Page", "Cells", "Seconds of processors", "Seconds by the clock", "Ended")]
+        for file in sorted(EXECUTED.glob("*/record.json")):
+            record = json.loads(file.read_text(encoding="utf-8"))
+            cost = [f"{record.get(key, 0):.0f}" for key in ("processor_seconds", "seconds")]
+            rows.append(
+                (
+                    file.parent.name,
+                    str(record["cells"]),
+                    *cost,
+                    "failed" if record["error"] else "well",
+                )
             )
+        return [table_of(rows)]
+
+
+def table_of(rows: list[tuple[str, ...]]) -> nodes.table:
+    """A table whose first row is its head."""
+    group = nodes.tgroup("", *(nodes.colspec(colwidth=1) for _ in rows[0]), cols=len(rows[0]))
+    filled = [
+        nodes.row("", *(nodes.entry("", nodes.paragraph(text=cell)) for cell in row))
+        for row in rows
+    ]
+    group += [nodes.thead("", filled[0]), nodes.tbody("", *filled[1:])]
+    return nodes.table("", group)
 
 
 def setup(app: Sphinx) -> dict:
     app.connect("config-inited", drop_buttons_without_repository)
-    app.connect("config-inited", take_weights)
     app.connect("html-page-context", add_player)
-    app.connect("env-updated", check_time)
+    app.add_directive("build-record", BuildRecord)
     app.connect("build-finished", copy_scripts)
     app.add_js_file(None, body=SEARCH_FROM_DISK, priority=800)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
