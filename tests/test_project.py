@@ -242,6 +242,19 @@ def test_reference_names_every_public_module():
     assert not missing, f"book/api.md has no section for {sorted(missing)}"
 
 
+def test_functions_of_the_reference_are_where_it_says():
+    """As one writes them after `import motionlab`, whatever file they stand in."""
+    text = (ROOT / "book" / "api.md").read_text(encoding="utf-8")
+    names = re.findall(r"autofunction:: motionlab\.(\S+)", text)
+    assert {"contacts.label", "solvers.lock_feet", "viewer.show", "viewer.plots.curves"} <= {*names}
+    for name in names:
+        first, *rest = name.split(".")
+        found = importlib.import_module(f"motionlab.{first}") if rest else motionlab
+        for part in rest or [first]:
+            found = getattr(found, part)
+        assert callable(found), name
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem)
 def test_notebook_is_stored_without_outputs(path):
     cells = json.loads(path.read_text(encoding="utf-8"))["cells"]

@@ -53,18 +53,12 @@ class BuildRecord(SphinxDirective):
     """A table of what was executed for this book, and what it cost."""
 
     def run(self) -> list[nodes.Node]:
-        rows = [("Page", "Cells", "Seconds of processors", "Seconds by the clock", "Ended")]
+        rows = [("Page", "Cells", "Threads", "Seconds of processors", "By the clock", "Ended")]
         for file in sorted(EXECUTED.glob("*/record.json")):
             record = json.loads(file.read_text(encoding="utf-8"))
-            cost = [f"{record.get(key, 0):.0f}" for key in ("processor_seconds", "seconds")]
-            rows.append(
-                (
-                    file.parent.name,
-                    str(record["cells"]),
-                    *cost,
-                    "failed" if record["error"] else "well",
-                )
-            )
+            used = [f"{record.get(key, 0):.0f}" for key in ("processor_seconds", "seconds")]
+            told = (str(record["cells"]), record.get("threads", ""), *used)
+            rows.append((file.parent.name, *told, "failed" if record["error"] else "well"))
         return [table_of(rows)]
 
 
