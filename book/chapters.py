@@ -122,7 +122,11 @@ def data_at_hand() -> list[tuple[str, int, int]]:
 
 
 def fingerprint(chapter: Chapter, around: str) -> str:
-    return hashlib.sha256(around.encode() + chapter.path.read_bytes()).hexdigest()
+    """Of a page's code and all that it stands on; its words decide nothing."""
+    page = read_page(chapter.path)
+    code = [(c.source, c.metadata) for c in page.cells if c.cell_type == "code"]
+    facts = json.dumps([around, code, page.metadata.get("kernelspec")], sort_keys=True)
+    return hashlib.sha256(facts.encode()).hexdigest()
 
 
 def good(chapter: Chapter, around: str) -> bool:

@@ -136,6 +136,13 @@ def test_what_did_not_change_is_not_executed_again(write, keep, chapters):
     keep(one)
     assert chapters.good(one, "here")
     assert not chapters.good(one, "another library")
+    page = nbformat.read(one.path, as_version=4)
+    page.cells.insert(0, nbformat.v4.new_markdown_cell("Words alone change nothing."))
+    nbformat.write(page, one.path)
+    assert chapters.good(one, "here")
+    page.cells[1].metadata["tags"] = ["hide-input"]  # it goes with what is kept
+    nbformat.write(page, one.path)
+    assert not chapters.good(one, "here")
     write("one", "print(2)")
     assert not chapters.good(one, "here") and one.executed() is None  # another page's outputs
 
