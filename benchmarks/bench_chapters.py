@@ -4,7 +4,7 @@
 
 Each chapter is executed by book/execute.py on one thread and on two, alone and beside other programs
 that want all of a core each; then all of them side by side, on one thread each, against one after
-another on two, as the book was built until November 2026. Minutes to an hour.
+another on two, as the book was built until November 2026. Half an hour.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from interleaved import save, table
 BOOK = Path(__file__).parents[1] / "book"
 sys.path.insert(0, str(BOOK))
 import chapters  # noqa: E402
+
+CAP = 3  # times what a chapter takes alone, after which it is ended: nobody would wait
 
 
 @dataclass
@@ -50,18 +52,42 @@ def beside(programs: int) -> Iterator[None]:
             other.wait()
 
 
-def cost(chapter: chapters.Chapter, threads: int) -> dict:
-    """Seconds of a chapter by the clock and of processors."""
+def cost(chapter: chapters.Chapter, threads: int, most: float | None) -> dict:
+    """Seconds of a chapter by the clock and of processors; `most` if it was ended after so many."""
     with tempfile.TemporaryDirectory() as into:
         command = [sys.executable, str(BOOK / "execute.py"), str(chapter.path), "--into", into]
-        said = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        subprocess.run(
-            command, env={**os.environ, "OMP_NUM_THREADS": str(threads)}, **said, check=True
-        )
+        environment = {**os.environ, "OMP_NUM_THREADS": str(threads)}
+        silent = subprocess.DEVNULL
+        process = subprocess.Popen(command, env=environment, stdout=silent, stderr=silent)
+        try:
+            process.wait(most)
+        except subprocess.TimeoutExpired:
+            process.terminate()
+            process.wait()
+            return {"more than": most}
         record = json.loads((Path(into) / "record.json").read_text())
     if record["error"]:
         sys.exit(f"{chapter.shown}: {record['error']['message']}")
     return {key: record[key] for key in ("seconds", "processor_seconds")}
+
+
+def measured(chapter: chapters.Chapter, busy: int) -> dict[str, dict]:
+    """What a chapter costs on one thread and two, alone and beside others; prints it."""
+    rows, most = {}, None
+    for others in (0, busy):
+        with beside(others):
+            for threads in (1, 2):
+                rows[f"{threads} threads, {others} busy"] = cost(chapter, threads, most)
+                most = most or CAP * rows["1 threads, 0 busy"]["seconds"]
+    alone = rows["1 threads, 0 busy"]["seconds"]
+    lines = []
+    for name, row in rows.items():
+        seconds, over = row.get("seconds", row.get("more than")), "seconds" not in row
+        lines.append(
+            (name, f"{'> ' * over}{seconds:.0f} s", f"{'> ' * over}{seconds / alone:.2f} x")
+        )
+    table(chapter.name, lines)
+    return rows
 
 
 def side_by_side(some: list[chapters.Chapter], jobs: int) -> float:
@@ -76,20 +102,7 @@ def side_by_side(some: list[chapters.Chapter], jobs: int) -> float:
 def main(options: Options) -> None:
     os.environ.pop("OMP_NUM_THREADS", None)
     some = [c for c in chapters.find() if not options.only or c.name.startswith(options.only)]
-    found = {}
-    for chapter in some:
-        rows = {}
-        for others in (0, options.busy):
-            with beside(others):
-                for threads in (1, 2):
-                    rows[f"{threads} threads, {others} busy"] = cost(chapter, threads)
-        found[chapter.name] = rows
-        alone = rows["1 threads, 0 busy"]["seconds"]
-        lines = [
-            (name, f"{r['seconds']:.0f} s", f"{r['seconds'] / alone:.2f} x")
-            for name, r in rows.items()
-        ]
-        table(chapter.name, lines)
+    found = {chapter.name: measured(chapter, options.busy) for chapter in some}
     jobs = chapters.cores()
     before = sum(rows["2 threads, 0 busy"]["seconds"] for rows in found.values())
     now = side_by_side(some, jobs)
