@@ -1,44 +1,39 @@
 """BVH files in and out, on top of pybvh.
 
-pybvh knows the format's syntax. This module adds what real files need besides: channels that move
-inner joints, byte-order marks and old encodings, wrong frame rates, T-poses in front, and errors
-that name file, line and remedy.
+pybvh knows the format's syntax. `read_bvh` adds what real files need besides: channels that move
+inner joints, spellings that other programs read, byte-order marks and old encodings, wrong frame
+rates, T-poses in front, other axes that point up, and errors that name file, line and remedy.
 """
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import tempfile
 import warnings
 from collections.abc import Sequence
-from numbers import Real
 from pathlib import Path
 
 import numpy as np
 import pybvh
-import torch
 from pybvh.bvhnode import BvhEndSite, BvhJoint, BvhNode, BvhRoot
 
 from ..errors import BvhError
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .bvh_text import Layout, decode, parse_rows, split
-from .euler import from_euler, to_euler
-
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-# Bones are rigid here. Position channels of inner joints may wobble by this much, in metres.
-RIGID = 0.001
-# A person between a toddler and a giant; anything else is most likely a wrong unit.
-HEIGHTS = (0.4, 3.0)
+from .bvh_reading import Doubts, Reading, parse, read
+from .bvh_units import in_metres
+from .euler import to_euler
 
 
 def read_bvh(
     path: str | os.PathLike,
     *,
     units: str | float = "cm",
+    up: str | None = None,
     fps: float | None = None,
+    root: str | None = None,
+    rigid: str | None = None,
     tpose_first: bool = False,
     drop_zeros: bool = False,
     source: str = "",
@@ -48,75 +43,50 @@ def read_bvh(
     Parameters
     ----------
     path : the file.
-    units : the file's unit of length, one of "m", "cm", "mm", "in", "ft", or metres per unit. BVH
-        does not say, most exporters write centimetres.
+    units : the file's unit of length, one of "m", "dm", "cm", "mm", "in", "ft", or metres per unit.
+        BVH does not say, most exporters write centimetres.
+    up : the file's axis that points up, one of "y", "-y", "z", "-z", "x", "-x". World and rest pose
+        are turned so that y is up; of z-up, x, y, z become x, z, -y. None takes y, and warns of a
+        trunk that is hardly ever upright.
     fps : frames per second, for a file whose own frame time is wrong.
+    root : the ROOT to read, by its name, of a file that holds several bodies.
+    rigid : "mean" reads joints that slide against their parents, at their mean offset, and says how
+        much that moves them; None refuses them if they slide by more than 1 mm.
     tpose_first : frame 0 is a T-pose for calibration; leave it out.
     drop_zeros : leave out leading frames in which every rotation is zero.
     source : kept as ``motion.source``.
 
-    The root's position channels replace its OFFSET. A root that does nothing but carry one moving
-    joint (``joint_Root`` above ``Hips``) is folded into that joint.
+    The root's position channels replace its OFFSET. A root that does nothing but carry the body
+    (``joint_Root`` above ``Hips``) is folded into it; what else hangs there, such as an engine's
+    targets for hands and feet, is left out with a warning. Channels that a joint lacks are zero,
+    positions its OFFSET; scale is left out. Rows are read as they are, with a warning if their
+    number is not the one declared; one that is cut off in the middle is refused, as the file has
+    lost its end then.
 
     Returns
     -------
-    Motion : metres, frames per second, rotation orders and end sites as in the file.
+    Motion : metres, y up, frames per second, rotation orders and end sites as in the file.
 
     Raises
     ------
     BvhError : the file can't be read; the message names file, line and remedy.
     """
-    if not isinstance(path, str | os.PathLike):
-        raise BvhError(f"read_bvh: {path!r} is not a path; give the file to read.")
-    path = Path(path)
-    try:
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        reason = getattr(error, "strerror", None) or error
-        raise BvhError(f"{path}: can't be opened ({reason}); check path and rights.") from error
-    return parse_bvh(
-        data,
-        path,
-        units=units,
-        fps=fps,
-        tpose_first=tpose_first,
-        drop_zeros=drop_zeros,
-        source=source,
-    )
-
-
-def parse_bvh(
-    data: bytes,
-    where: str | os.PathLike,
-    *,
-    units: str | float = "cm",
-    fps: float | None = None,
-    tpose_first: bool = False,
-    drop_zeros: bool = False,
-    source: str = "",
-) -> Motion:
-    """`read_bvh` for the bytes of a file; `where` is what errors call it."""
-    metres = _metres(units)
-    text = decode(data, where)
-    header, first_row = split(text, where)
-    layout = Layout(header, where)
-    rate = _rate(layout) if fps is None else _positive(fps, where)
-    tree = _parse_tree(layout, where)
-    values = parse_rows(text, first_row, len(layout.columns), layout.frames, where)
-    angles, shifts = layout.sort(values)
-    skip = int(tpose_first)
-    if drop_zeros:
-        moving = np.flatnonzero(angles[skip:].any((1, 2)))
-        skip += int(moving[0]) if len(moving) else len(angles) - skip
-    if skip >= len(values):
-        raise BvhError(
-            f"{where}: nothing is left of {len(values)} frames after leaving out the first {skip} "
-            "(T-pose and zero frames); read it with tpose_first=False, drop_zeros=False."
-        )
-    shifts = {joint: shift[skip:] * metres for joint, shift in shifts.items()}
-    motion = _assemble(tree, layout.joints, angles[skip:], shifts, metres, rate, where, source)
-    _warn_of_units(motion, where, units)
+    how = Reading(units, fps, tpose_first, drop_zeros, up, root, rigid)
+    motion, doubts = read(path, how, source)
+    _warn(path, doubts)
     return motion
+
+
+def parse_bvh(data: bytes, where: str | os.PathLike, *, source: str = "", **reading) -> Motion:
+    """`read_bvh` for the bytes of a file; `where` is what errors call it."""
+    motion, doubts = parse(data, where, Reading(**reading), source)
+    _warn(where, doubts)
+    return motion
+
+
+def _warn(where: str | os.PathLike, doubts: Doubts) -> None:
+    for said in doubts.values():
+        warnings.warn(f"{where}: {said}", stacklevel=3)
 
 
 def write_bvh(
@@ -136,7 +106,7 @@ def write_bvh(
             "write_bvh(motion, 'walk.bvh')."
         )
     path = Path(path)
-    scale = 1 / _metres(units)
+    scale = 1 / in_metres(units)
     if len(motion) == 0:
         raise BvhError(f"{path}: the motion has no frames; there is nothing to write.")
     if path.suffix.lower() != ".bvh":
@@ -173,125 +143,6 @@ def write_bvh(
         raise BvhError(
             f"{path}: joints are nested too deeply for pybvh to write; shorten the chain."
         ) from error
-
-
-# -- reading ------------------------------------------------------------------------------------
-
-
-def _metres(units: str | float) -> float:
-    metres = UNITS.get(units) if isinstance(units, str) else units
-    if not _is_positive(metres):
-        raise BvhError(
-            f"Unknown unit {units!r}; use one of {', '.join(UNITS)}, or metres per unit."
-        )
-    return float(metres)
-
-
-def _positive(fps: float, where) -> float:
-    if not _is_positive(fps):
-        raise BvhError(f"{where}: fps={fps!r} is not a positive number of frames per second.")
-    return float(fps)
-
-
-def _is_positive(value) -> bool:
-    try:
-        return isinstance(value, Real) and math.isfinite(value) and value > 0
-    except OverflowError:  # an integer beyond every float
-        return False
-
-
-def _rate(layout: Layout) -> float:
-    """Frames per second. Most headers round their frame time to six or seven digits: a rate
-    within 0.01 % of a whole number is that number."""
-    rate = 1 / layout.frame_time()
-    whole = round(rate)
-    return float(whole) if abs(rate - whole) < 1e-4 * rate else round(rate, 6)
-
-
-def _parse_tree(layout: Layout, where) -> list[BvhNode]:
-    """The hierarchy's nodes, read by pybvh from the prepared header and one frame of zeros."""
-    lines = [line for _, line in layout.hierarchy]
-    zeros = "0 " * (3 + 3 * len(layout.joints))
-    lines += ["MOTION", "Frames: 1", "Frame Time: 1", zeros, ""]
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "header.bvh"
-        # pybvh opens files in the locale's encoding
-        file.write_text("\n".join(lines), errors="backslashreplace")
-        try:
-            return pybvh.read_bvh_file(file, world_up="+y").nodes
-        except Exception as error:  # pybvh raises whatever Python raised on a bad token
-            message = str(error).replace(f" in file {file}", "")
-            found = re.search(r"(.*?),? at line (\d+):? ?(.*)", message)
-            what, line, why = found.groups() if found else (message[:200], "1", "")
-            number = layout.hierarchy[min(int(line), len(layout.hierarchy)) - 1][0]
-            raise BvhError(
-                f"{where}, line {number}: {': '.join(filter(None, (what, why)))[:200]}; mend that "
-                "part of the hierarchy, or export the file again."
-            ) from error
-
-
-def _assemble(
-    nodes: list[BvhNode],
-    lines: dict[str, int],
-    angles: np.ndarray,
-    shifts: dict[int, np.ndarray],
-    metres: float,
-    fps: float,
-    where,
-    source: str,
-) -> Motion:
-    """A motion from pybvh's nodes, angles in degrees and shifts in metres (see `Layout`)."""
-    names = list(lines)
-    joints = [node for node in nodes if not node.is_end_site()]
-    index = {id(node): i for i, node in enumerate(joints)}
-    parents = [-1 if node.parent is None else index[id(node.parent)] for node in joints]
-    orders = ["".join(node.rot_channels) for node in joints]
-    offsets = np.array([node.offset for node in joints]) * metres
-    # in the order of their joints, so that a clip written and read again keeps its points
-    ends = [(index[id(node.parent)], node.offset) for node in nodes if node.is_end_site()]
-    ends.sort(key=lambda end: end[0])
-    end_parents = [parent for parent, _ in ends]
-    rotations = from_euler(angles, orders)
-    root = shifts.get(0, np.tile(offsets[0], (len(angles), 1)))
-
-    # A root that only carries one joint, which is not where its OFFSET says, is folded into it:
-    # its pose times the joint's. (Compared with the OFFSET so that one frame tells, too.)
-    children = np.bincount([parent + 1 for parent in parents + end_parents])
-    first, turn = 0, rotations[:, 0].astype(np.float64)
-    while (
-        first + 1 < len(names)
-        and children[first + 1] == 1
-        and first + 1 in shifts
-        and np.abs(shifts[first + 1] - offsets[first + 1]).max() > RIGID
-    ):
-        first += 1
-        root = root + (turn @ shifts[first][..., None])[..., 0]
-        turn = turn @ rotations[:, first]
-    rotations = rotations[:, first:]
-    rotations[:, 0] = turn
-
-    for joint in range(first + 1, len(names)):
-        if joint in shifts:
-            offsets[joint] = shifts[joint].mean(0)
-            wobble = np.linalg.norm(shifts[joint] - offsets[joint], axis=-1).max()
-            if wobble > RIGID:
-                raise BvhError(
-                    f"{where}, line {lines[names[joint]]}: joint {names[joint]!r} moves against "
-                    f"its parent by up to {wobble * 100:.1f} cm; bones here are rigid: bake the "
-                    "motion to rotations in the program it comes from."
-                )
-    skeleton = Skeleton(
-        tuple(names[first:]),
-        tuple(max(parent - first, -1) for parent in parents[first:]),
-        torch.from_numpy(offsets[first:]),
-        tuple(parent - first for parent in end_parents),
-        torch.tensor(np.array([offset for _, offset in ends]) * metres),
-        tuple(orders[first:]),
-    )
-    return Motion(skeleton, root, rotations, fps, name=Path(where).stem, source=source)
-
-
-# -- writing ------------------------------------------------------------------------------------
 
 
 def _depth_first(parents: Sequence[int]) -> list[int]:
@@ -343,21 +194,3 @@ def _restore_names(file: Path, names: Sequence[str]) -> None:
         r"(ROOT|JOINT) joint(\d+)", lambda found: f"{found[1]} {names[int(found[2])]}", header
     )
     file.write_text(header + motion + rows, encoding="utf-8")
-
-
-def _warn_of_units(motion: Motion, where, units: str | float) -> None:
-    """Warn if the body is not the size of a person."""
-    roles, skeleton = motion.skeleton.roles, motion.skeleton
-    if not {"head", "left_foot"} <= roles.keys():
-        return
-    height = 0.0
-    for joint in (roles["head"], roles["left_foot"]):
-        while skeleton.parents[joint] >= 0:
-            height += float(skeleton.offsets[joint].norm())
-            joint = skeleton.parents[joint]
-    if not HEIGHTS[0] < height < HEIGHTS[1]:
-        warnings.warn(
-            f"{where}: from foot to head the body measures {height:.2f} m in units={units!r}; "
-            "pass another unit if that is not a person.",
-            stacklevel=4,
-        )

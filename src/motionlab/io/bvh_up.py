@@ -1,0 +1,114 @@
+"""Which axis of a BVH file points up: motion turned so that y does, and files that do not say so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import torch
+from torch import Tensor
+
+from ..errors import BvhError
+from ..motion import Motion
+from ..skeleton import Skeleton
+from .bvh_units import ancestors
+
+# What x, y and z become where the named axis of the file points up: turned about the file's x, and
+# where that is up itself, about its z. "-y" is the half turn from a camera's axes, whose y is down.
+_TURNS = {
+    "y": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "-y": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    "z": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "-z": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    "x": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
+    "-x": ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
+}
+_UPRIGHT = 0.7  # of a unit vector along the trunk, what must point up
+_SHARE = 0.05  # of the frames; with fewer upright ones, it is not a person who lies down for once
+_LOOKED_AT = 64  # frames, spread over the clip: enough to tell, and no time
+
+
+def check_up(up: str | None) -> None:
+    """Raise a BvhError if it is no axis."""
+    if up is not None and not (isinstance(up, str) and up in _TURNS):
+        raise BvhError(
+            f"up={up!r} is no axis; use one of {', '.join(map(repr, _TURNS))}: the file's that "
+            "points up."
+        )
+
+
+def turn_up(motion: Motion, up: str | None) -> Motion:
+    """The motion with y up, of one whose axis `up` is.
+
+    World and rest pose are turned alike, so that both are y-up, and local rotations are about the
+    turned axes, in which order and by which angles is as before. A rest pose that stands upright
+    along y already, on a root that carries the quarter turn, stays as it is.
+    """
+    if up in (None, "y"):
+        return motion
+    turn = torch.tensor(_TURNS[up], dtype=torch.float32)
+    rotations = motion.rotations.clone()
+    skeleton = motion.skeleton
+    rotations[:, 0] = turn @ rotations[:, 0]
+    if not _rests_upright(skeleton):
+        rotations = rotations @ turn.T
+        rotations[:, 1:] = turn @ rotations[:, 1:]
+        becomes = {"XYZ"[old]: "XYZ"[new] for new, old in enumerate(turn.abs().argmax(1).tolist())}
+        skeleton = Skeleton(
+            skeleton.names,
+            skeleton.parents,
+            skeleton.offsets @ turn.T,
+            skeleton.end_parents,
+            skeleton.end_offsets @ turn.T,
+            tuple("".join(becomes[axis] for axis in o) for o in skeleton.rotation_orders),
+        )
+    return replace(
+        motion,
+        skeleton=skeleton,
+        root_positions=motion.root_positions @ turn.T,
+        rotations=rotations,
+    )
+
+
+def doubt_up(motion: Motion) -> str | None:
+    """What to say if the trunk, as far as the joints' roles tell it, is hardly ever upright."""
+    some = motion.rotations[:: -(-len(motion) // _LOOKED_AT)]
+    trunk = _trunk(motion.skeleton, some)
+    if trunk is None or (trunk[:, 1] > _UPRIGHT).float().mean() >= _SHARE:
+        return None
+    mean = trunk.mean(0)
+    axis = int(mean.abs().argmax())
+    name = "-" * bool(mean[axis] < 0) + "xyz"[axis]
+    if name == "y":  # leaning, this way and that
+        return None
+    return (
+        f"the body's trunk points along {name} and is upright (along y) in hardly any frame; if "
+        f"{name} is up in this file, read it with up={name!r}, if the person lies, with up='y'."
+    )
+
+
+def _rests_upright(skeleton: Skeleton) -> bool:
+    trunk = _trunk(skeleton, torch.eye(3).expand(1, skeleton.joints, 3, 3))
+    return trunk is not None and bool(trunk[0, 1] > _UPRIGHT)
+
+
+def _trunk(skeleton: Skeleton, rotations: Tensor) -> Tensor | None:
+    """Unit vectors (frames, 3) from the hips to neck, head or chest; None if the names don't tell.
+
+    rotations : (frames, joints, 3, 3), local.
+    """
+    roles = skeleton.roles
+    top = next((roles[role] for role in ("neck", "head", "chest") if role in roles), None)
+    hips = roles.get("hips")
+    if top is None or hips is None or hips == top:
+        return None
+    way = ancestors(skeleton, top)[::-1]
+    if hips not in way:
+        return None
+    turn, trunk = torch.eye(3).expand(len(rotations), 3, 3), torch.zeros(len(rotations), 3)
+    for joint, child in pairwise(way):
+        turn = turn @ rotations[:, joint]
+        if joint >= hips:
+            trunk = trunk + turn @ skeleton.offsets[child]
+    length = trunk.norm(dim=-1, keepdim=True)
+    return trunk / length if bool((length > 0).all()) else None
