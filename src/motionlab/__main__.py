@@ -157,9 +157,16 @@ class Prepare:
     permissive: bool = False
     """Leave out clips whose licence forbids commercial use."""
     units: str | None = None
-    """Of a folder's files: m, cm, mm, in, ft, or metres per unit; cm if left out."""
+    """Of a folder's files: m, dm, cm, mm, in, ft, or metres per unit; cm if left out."""
+    up: str | None = None
+    """Axis that points up in a folder's files: y, z, x, or with a minus, as --up=-z; y if left out,
+    with a warning of bodies that are never upright."""
+    root: str | None = None
+    """Name of the ROOT to read, of a folder's files that hold several bodies."""
+    rigid: str | None = None
+    """mean: put joints that slide against their parents at their mean offset; refused if left out."""
     skip_bad: bool = False
-    """Leave out a folder's files that can't be read."""
+    """Leave out a folder's files that can't be read or brought to the canonical skeleton."""
     out: Path | None = None
     """File to write; runs/NAME.npz, or runs/NAME-permissive.npz, if left out."""
 
@@ -168,8 +175,10 @@ class Prepare:
         from .training.prepared import file_of
 
         out = self.out or file_of(self.source, self.permissive)
-        reading = {"units": _number_or(self.units)} if self.units is not None else {}
-        reading |= {"skip_bad": True} if self.skip_bad else {}
+        units = None if self.units is None else _number_or(self.units)
+        reading = {"units": units, "up": self.up, "root": self.root, "rigid": self.rigid,
+                   "skip_bad": self.skip_bad or None}  # fmt: skip
+        reading = {name: value for name, value in reading.items() if value is not None}
         prepared = prepare(self.source, progress=True, permissive=self.permissive, **reading)
         prepared.save(out)
         print(f"{out}: {len(prepared.names)} clips, {len(prepared.features)} frames, "

@@ -3,14 +3,15 @@
 import os
 import re
 
+import bvh_corpus as corpus
 import numpy as np
 import pytest
 import torch
 from tiny_bvh import tiny_bvh
 
-from motionlab import datasets
-from motionlab.datasets import registry
-from motionlab.errors import DataError
+from motionlab import datasets, write_bvh
+from motionlab.datasets import gaits, registry
+from motionlab.errors import BvhError, DataError
 
 
 def same(a, b) -> bool:
@@ -240,6 +241,44 @@ def test_from_folder_names_every_bad_file(folder):
         datasets.from_folder(folder)
     with pytest.warns(UserWarning, match=r"bad1\.bvh"):
         assert len(datasets.from_folder(folder, skip_bad=True)) == 3
+
+
+def test_what_is_doubtful_about_files_is_said_once(tmp_path):
+    walk = gaits.make(seconds=1, speed=1.4)
+    for name in "abcd":
+        write_bvh(walk, tmp_path / f"{name}.bvh", units="in")
+    (tmp_path / "d.bvh").write_bytes(tiny_bvh(9))
+    text = (tmp_path / "c.bvh").read_text(encoding="utf-8")
+    text = text.replace("Frames: 30", "Frames: 29")
+    (tmp_path / "c.bvh").write_text(text, encoding="utf-8")
+    with pytest.warns(UserWarning) as caught:
+        assert len(datasets.from_folder(tmp_path)) == 4
+    units, count = sorted((str(w.message) for w in caught), key=lambda said: "declares" in said)
+    assert re.search(r"3 of 4 files, first .*a\.bvh: .*units='in'", units)
+    assert re.match(r".*c\.bvh: the header declares 29", count)
+    assert all(w.filename == __file__ for w in caught)
+
+
+def test_from_folder_of_another_axis_of_several_bodies_of_joints_that_slide(folder):
+    for file in folder.rglob("*.[bB][vV][hH]"):
+        lies = file.read_text(encoding="utf-8").replace("20 0", "0 20").replace("10 0\n", "0 10\n")
+        file.write_text(re.sub(r"30.5 (\d)", r"\1 30.5", lies), encoding="utf-8")
+    with pytest.warns(UserWarning, match="3 of 3 files.*up='z'"):
+        raw = datasets.from_folder(folder)
+    for motion, turned in zip(raw, datasets.from_folder(folder, up="z"), strict=True):
+        x, y, z = motion.positions().unbind(-1)
+        torch.testing.assert_close(turned.positions(), torch.stack([x, z, -y], -1))
+    slides = corpus.six_channels([(9, 0, 0), (9, 0, 5), (9, 0, 0)], "LeftArm")
+    (folder / "b.bvh").write_text(slides, encoding="utf-8")
+    with pytest.raises(DataError, match=r"(?s)1 of 3 files.*b\.bvh.*rigid='mean'"):
+        datasets.from_folder(folder, up="z")
+    with pytest.raises(DataError, match=r"(?s)3 of 3 files.*root= must be one of: Hips"):
+        datasets.from_folder(folder, up="z", root="World")
+    with pytest.warns(UserWarning, match="'LeftArm' the most"):
+        assert len(datasets.from_folder(folder, up="z", rigid="mean")) == 3
+    for wrong in ({"up": "w"}, {"units": "furlong"}, {"rigid": "yes"}):
+        with pytest.raises(BvhError):  # once, not for each file
+            datasets.from_folder(folder, **wrong)
 
 
 def test_from_folder_that_is_empty_or_absent(tmp_path):

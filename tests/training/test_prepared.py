@@ -173,6 +173,50 @@ def test_a_folder_in_other_units_with_a_bad_file(tmp_path, monkeypatch, capsys, 
     torch.testing.assert_close(metres.features, centimetres.features, atol=1e-5, rtol=0)
 
 
+def test_a_file_of_a_rig_that_nobody_knows_is_named_or_left_out(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    motions = datasets.load("gaits", "val") + datasets.load("gaits", "test")
+    for i, motion in enumerate(motions):
+        write_bvh(motion[:40], _folder("clips") / f"{i}.bvh")
+    other = Skeleton(("a", "b"), (-1, 0), torch.zeros(2, 3))
+    names = {tuple(prepare("clips").names)}
+    odd = replace(motions[0], skeleton=other, rotations=motions[0].rotations[:, :2], contacts=None)
+    for i in (3, 4):
+        write_bvh(odd, f"clips/x{i}.bvh")
+    assert main(["prepare", "clips"]) == 1
+    said = capsys.readouterr().err
+    assert all(f"x{i}.bvh: The motion's skeleton has no joint" in said for i in (3, 4))
+    with pytest.warns(UserWarning, match=r"(?s)2 of \d+ files.*x3\.bvh.*x4\.bvh") as caught:
+        assert main(["prepare", "clips", "--skip-bad"]) == 0
+    assert len(caught) == 1
+    names.add(Prepared.load("runs/clips.npz").names)
+    assert len(names) == 1
+
+
+def test_a_folder_whose_z_is_up(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    turn = torch.tensor([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # to z-up
+    for i, motion in enumerate(datasets.load("gaits", "val") + datasets.load("gaits", "test")):
+        write_bvh(motion[:40], _folder("y") / f"{i}.bvh")
+        its = motion.skeleton
+        skeleton = Skeleton(its.names, its.parents, its.offsets @ turn.T, its.end_parents,
+                            its.end_offsets @ turn.T)  # fmt: skip
+        turned = replace(
+            motion, skeleton=skeleton, root_positions=motion.root_positions @ turn.T,
+            rotations=turn @ motion.rotations @ turn.T,
+        )  # fmt: skip
+        write_bvh(turned[:40], _folder("z") / f"{i}.bvh")
+    assert main(["prepare", "y"]) == main(["prepare", "z", "--up", "z"]) == 0
+    y, z = (Prepared.load(f"runs/{name}.npz") for name in "yz")
+    torch.testing.assert_close(y.features, z.features, atol=1e-4, rtol=0)
+    assert main(["prepare", "z", "--up", "w"]) == 1
+
+
+def _folder(name: str) -> Path:
+    Path(name).mkdir(exist_ok=True)
+    return Path(name)
+
+
 def test_how_named_data_are_read_is_no_question():
     with pytest.raises(DataError, match="leave out units"):
         prepare("gaits", units="m")

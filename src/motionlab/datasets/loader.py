@@ -14,8 +14,9 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from ..errors import BvhError, DataError
-from ..io.bvh import parse_bvh, read_bvh
+from ..errors import BvhError, DataError, MotionLabError
+from ..io.bvh import parse_bvh
+from ..io.bvh_reading import Reading, read
 from ..motion import Motion
 from . import cache, files, locomotion
 from .registry import (
@@ -31,6 +32,7 @@ from .registry import (
 )
 from .splits import assign
 
+BVH_FILES = "**/*.[bB][vV][hH]"
 _lock = threading.Lock()
 _threads_before: list[int] = []  # of loads under way; what to go back to is what the first found
 
@@ -167,13 +169,15 @@ def _gaits(split: str | None, clips: Sequence[str] | None) -> list[Motion]:
     return [motion for motion in motions if motion.name in wanted]
 
 
-@_one_thread()
 def from_folder(
     path: str | os.PathLike,
     *,
     units: str | float = "cm",
+    up: str | None = None,
     fps: float | None = None,
-    pattern: str = "**/*.[bB][vV][hH]",
+    root: str | None = None,
+    rigid: str | None = None,
+    pattern: str = BVH_FILES,
     tpose_first: bool = False,
     drop_zeros: bool = False,
     split: str | None = None,
@@ -184,7 +188,8 @@ def from_folder(
     Parameters
     ----------
     path : the folder.
-    units, fps, tpose_first, drop_zeros : as for `motionlab.read_bvh`, for all files alike.
+    units, up, fps, root, rigid, tpose_first, drop_zeros : as for `motionlab.read_bvh`, for all files
+        alike. What is doubtful about files, such as their units, is said once, with their number.
     pattern : which files, as for `pathlib.Path.glob`.
     split : only the files of this split; which are in it depends on the files' names alone.
     skip_bad : leave out files that can't be read, with a warning, instead of raising.
@@ -197,8 +202,61 @@ def from_folder(
     ------
     DataError : there is no such folder or no such file in it, or files that can't be read; the
         message names all of them.
+    BvhError : an argument makes no sense.
+    """
+    found = read_folder(
+        path, pattern=pattern, split=split, skip_bad=skip_bad, units=units, up=up, fps=fps,
+        root=root, rigid=rigid, tpose_first=tpose_first, drop_zeros=drop_zeros,
+    )  # fmt: skip
+    return [motion for _, motion in found]
+
+
+@_one_thread()
+def read_folder(
+    path: str | os.PathLike,
+    *,
+    then: Callable[[Motion], Motion] = lambda motion: motion,
+    pattern: str = BVH_FILES,
+    split: str | None = None,
+    skip_bad: bool = False,
+    **reading,
+) -> list[tuple[str, Motion]]:
+    """`from_folder`, each clip with its split before it, and with something done to each.
+
+    then : what is done; an error that it raises is a fault of the file, as one in reading is.
     """
     check_split(split)
+    how = Reading(**reading)
+    folder, chosen = _find(path, pattern, split)
+    motions, faults, doubtful = [], [], {}
+    with _progress(f"reading {folder.name}", len(chosen)) as bar:
+        for file, name, its in chosen:
+            try:
+                motion, doubts = read(file, how, folder.resolve().name)
+                for about, said in doubts.items():
+                    doubtful.setdefault(about, []).append(f"{file}: {said}")
+                motions.append((its, then(replace(motion, name=name))))
+            except BvhError as error:
+                faults.append(str(error))
+            except MotionLabError as error:
+                faults.append(f"{file}: {error}")
+            bar.update()
+    for said in doubtful.values():
+        count = f"{folder}, {len(said)} of {len(chosen)} files, first " if len(said) > 1 else ""
+        warnings.warn(count + said[0], stacklevel=4)
+    if faults:
+        message = f"{folder}: {len(faults)} of {len(chosen)} files can't be used:\n  "
+        message += "\n  ".join(faults)
+        if not skip_bad:
+            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True (--skip-bad).")
+        warnings.warn(message, stacklevel=4)
+    return motions
+
+
+def _find(
+    path: str | os.PathLike, pattern: str, split: str | None
+) -> tuple[Path, list[tuple[Path, str, str]]]:
+    """The folder, and of each of its files that is of the split: path, name of the clip, split."""
     if not isinstance(path, str | os.PathLike):
         raise DataError(f"from_folder: {path!r} is not a path; give the folder of the BVH files.")
     folder = Path(path).expanduser()
@@ -216,27 +274,8 @@ def from_folder(
         )
     names = [file.relative_to(folder).with_suffix("").as_posix() for file in found]
     splits = assign([("", name, "", "") for name in names])
-    chosen = [row for row in zip(found, names, splits, strict=True) if split in (None, row[2])]
-    motions, bad = [], []
-    with _progress(f"reading {folder.name}", len(chosen)) as bar:
-        for file, name, _ in chosen:
-            try:
-                motion = read_bvh(
-                    file, units=units, fps=fps, tpose_first=tpose_first, drop_zeros=drop_zeros,
-                    source=folder.resolve().name,
-                )  # fmt: skip
-                motions.append(replace(motion, name=name))
-            except BvhError as error:
-                bad.append(str(error))
-            bar.update()
-    if bad:
-        message = f"{folder}: {len(bad)} of {len(chosen)} files can't be read:\n  " + "\n  ".join(
-            bad
-        )
-        if not skip_bad:
-            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True.")
-        warnings.warn(message, stacklevel=3)
-    return motions
+    rows = zip(found, names, splits, strict=True)
+    return folder, [row for row in rows if split in (None, row[2])]
 
 
 def _progress(what: str, total: int) -> tqdm:

@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,6 +20,7 @@ import torch
 from torch import Tensor
 
 from .. import datasets, encodings
+from ..datasets.loader import read_folder
 from ..encodings import JointAngles, Normalizer, RootRelative
 from ..errors import DataError, TrainingError
 from ..motion import Motion
@@ -165,7 +166,8 @@ def prepare(
     source : the name of a data set, a folder of BVH files, or one of `DANCES`.
     progress : show how far it is.
     permissive : leave out clips whose licence forbids commercial use (of a data set).
-    reading : how to read a folder's files, such as `units`; see `datasets.from_folder`.
+    reading : how to read a folder's files, such as `units`, `up` or `skip_bad`; see
+        `datasets.from_folder`. Files that can't be retargeted are bad, too.
 
     Training clips are used twice, the second time mirrored. Rows are those of `JointAngles` with
     contacts; see `Prepared.without_contacts`. Dances keep their skeleton and are not mirrored; what
@@ -174,14 +176,13 @@ def prepare(
 
     Raises
     ------
-    DataError : no such data set or folder, files missing, or a split without clips.
+    DataError : no such data set or folder, files missing or bad, or a split without clips.
     """
     from tqdm import tqdm
 
     encoding = None if source in DANCES else JointAngles(Skeleton.canonical(), FPS, contacts=True)
     features, names, splits = [], [], []
-    for split in SPLITS:
-        motions = _load(source, split, permissive, reading)
+    for split, motions in _load(source, permissive, reading):
         encoding = encoding or RootRelative(motions[0].skeleton, motions[0].fps, STATURE)
         bar = tqdm(motions, f"encoding {split}", leave=False, unit="clip", disable=not progress)
         for motion in bar:
@@ -201,31 +202,50 @@ def prepare(
     return Prepared(rows, lengths, tuple(names), tuple(splits), encoding, normalizer, digest)
 
 
-def _load(source: str | os.PathLike, split: str, permissive: bool, reading: dict) -> list[Motion]:
-    """Canonical clips of a split, in training with their mirror images; dances as they are."""
+def _load(
+    source: str | os.PathLike, permissive: bool, reading: dict
+) -> Iterator[tuple[str, list[Motion]]]:
+    """Canonical clips of each split, in training with their mirror images; dances as they are."""
     if source in DANCES:
-        name, words = DANCES[source]
-        motions = datasets.load(name, split, permissive=permissive)
-        motions = [m for m in motions if any(word in m.name for word in words)]
-        if name != "aclstm-cmu":  # bodies of several sizes, in files whose rest pose lies down
-            motions = [motion.retarget() for motion in motions]
-        return [half for motion in motions for half in _halves(motion)]
-    if str(source) in datasets.names():
-        if reading:
-            raise DataError(
-                f"{source}: how its files are read is known; leave out {', '.join(reading)}."
-            )
-        motions = datasets.load(source, split, permissive=permissive)
-    elif permissive:
+        for split in SPLITS:
+            yield split, _dances(source, split, permissive)
+        return
+    own = None if str(source) in datasets.names() else _own(source, permissive, reading)
+    if own is None and reading:
+        raise DataError(
+            f"{source}: how its files are read is known; leave out {', '.join(reading)}."
+        )
+    for split in SPLITS:
+        if own is None:
+            loaded = datasets.load(source, split, permissive=permissive)
+            motions = [_canonical(motion) for motion in loaded]
+        else:
+            motions = [motion for its, motion in own if its == split]
+        if split == "train":
+            motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
+        yield split, motions
+
+
+def _dances(source: str, split: str, permissive: bool) -> list[Motion]:
+    name, words = DANCES[source]
+    motions = datasets.load(name, split, permissive=permissive)
+    motions = [m for m in motions if any(word in m.name for word in words)]
+    if name != "aclstm-cmu":  # bodies of several sizes, in files whose rest pose lies down
+        motions = [motion.retarget() for motion in motions]
+    return [half for motion in motions for half in _halves(motion)]
+
+
+def _own(source: str | os.PathLike, permissive: bool, reading: dict) -> list[tuple[str, Motion]]:
+    """Canonical clips of a folder, with their splits; all are read, so that all faults are told."""
+    if permissive:
         raise DataError(
             f"{source}: licences are known of named data sets only, not of a folder's clips."
         )
-    else:
-        motions = datasets.from_folder(source, split=split, **reading)
-    motions = [motion.resample(FPS).retarget() for motion in motions]
-    if split == "train":
-        motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
-    return motions
+    return read_folder(source, then=_canonical, **reading)
+
+
+def _canonical(motion: Motion) -> Motion:
+    return motion.resample(FPS).retarget()
 
 
 def _halves(motion: Motion) -> list[Motion]:
