@@ -151,9 +151,8 @@ def _cached_together(name: str) -> dict[str, list[Clip]]:
 
 
 def _parse(clip: Clip, data: bytes, bar) -> Motion:
-    motion = parse_bvh(
-        data, clip.path, units=sources()[clip.source].units, fps=clip.fps, source=clip.source
-    )
+    units = sources()[clip.source].units
+    motion = parse_bvh(data, clip.path, units=units, up="y", fps=clip.fps, source=clip.source)
     bar.update()
     return replace(motion[clip.skip :], name=clip.name)
 

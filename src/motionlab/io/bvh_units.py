@@ -39,18 +39,17 @@ def doubt_units(skeleton: Skeleton, units: str | float) -> str | None:
     if height is None or HEIGHTS[0] <= height <= HEIGHTS[1]:
         return None
     raw = height / in_metres(units)
-    said = f"from foot to head the body measures {height:.3g} m in units={units!r}"
+    said = f"from foot to head the body measures {float(f'{height:.3g}'):g} m in units={units!r}"
     if raw < 1e-9:
         return f"{said}; its bones have no length, export it with its offsets."
     best = min(UNITS, key=lambda unit: abs(math.log(raw * UNITS[unit] / _USUAL)))
     if HEIGHTS[0] <= raw * UNITS[best] <= HEIGHTS[1]:
-        return (
-            f"{said}, as no person does; units={best!r} would make that {raw * UNITS[best]:.2f} m."
+        better = f"units={best!r} makes it {raw * UNITS[best]:.2f} m"
+    else:
+        better = (
+            f"of {', '.join(UNITS)} none fits, metres per unit do, about units={_USUAL / raw:.2g}"
         )
-    return (
-        f"{said}, as no person does, nor does it in any unit of {', '.join(UNITS)}; if it is one, "
-        f"pass metres per unit, about units={_USUAL / raw:.2g}."
-    )
+    return f"{said}, as no person does; pass another unit: {better}."
 
 
 def _height(skeleton: Skeleton) -> float | None:

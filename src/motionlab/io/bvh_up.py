@@ -83,7 +83,8 @@ def doubt_up(motion: Motion) -> str | None:
         return None
     return (
         f"the body's trunk points along {name} and is upright (along y) in hardly any frame; if "
-        f"{name} is up in this file, read it with up={name!r}, if the person lies, with up='y'."
+        f"{name} is up in this file, read it with up={name!r}, if the person lies, crawls or "
+        "stands on the hands, with up='y'."
     )
 
 
