@@ -126,7 +126,7 @@ def main() -> None:
             for row in tqdm(rows, desc=source):
                 path = row["path"]
                 assert row["url"] == about.url + path, row["url"]
-                motion = parse_bvh(archive.read(path), path, units=about.units)
+                motion = parse_bvh(archive.read(path), path, units=about.units, up="y")
                 motions[source, path] = motion[skip(source, path) :]
     first = performances(list(motions), motions)
     table = []
