@@ -125,6 +125,14 @@ def test_index_of_an_absent_joint():
         Skeleton.canonical().index("tail")
 
 
+def test_a_joint_may_be_called_as_a_role_of_another():
+    names = ("pelvis", "left_hip", "left_knee", "left_ankle", "left_foot")
+    skeleton = Skeleton(names, (-1, 0, 1, 2, 3), torch.zeros(5, 3))
+    assert (skeleton.index("left_foot"), skeleton.role("left_foot")) == (4, 3)
+    with pytest.raises(SkeletonError, match="no joint or role 'left_knee'"):
+        skeleton.role("left_knee")
+
+
 def test_mirrored_twice_is_the_same():
     skeleton = Skeleton(
         ("Hips", "LeftArm", "RightArm", "Tail"), (-1, 0, 0, 0), torch.randn(4, 3),

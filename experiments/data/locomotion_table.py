@@ -32,7 +32,8 @@ from motionlab import Motion, contacts, datasets
 from motionlab.datasets import registry
 from motionlab.metrics import feet, gait
 from motionlab.retargeting.rest_alignment import rest_points
-from motionlab.skeleton import SIDES, Skeleton
+from motionlab.roles import SIDES
+from motionlab.skeleton import Skeleton
 
 RESULT = Path(__file__).parents[2] / "results/locomotion.json"
 LIMBS = {"hand": ("upper_arm", "lower_arm", "hand"), "foot": ("upper_leg", "lower_leg", "foot")}

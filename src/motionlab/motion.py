@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -213,8 +214,18 @@ class Motion:
         """The motion seen in a mirror: left and right swapped, x negated.
 
         It lives on the mirrored skeleton, which is the same skeleton where left and right bones
-        are reflections of each other, as on `Skeleton.canonical`.
+        are reflections of each other, as on `Skeleton.canonical`. Joints on one side whose partner
+        on the other is not known stay where they are, and a warning names them.
         """
+        if alone := self.skeleton.without_partner:
+            names = [self.skeleton.names[joint] for joint in alone]
+            more = f" and {len(names) - 12} more" if len(names) > 12 else ""
+            warnings.warn(
+                f"{self._label}: which joint on the other side belongs to {', '.join(names[:12])}"
+                f"{more} is not known, so these keep their side in the mirror; say which joint is "
+                "which with roles={'left_foot': 'NAME', ...} where the skeleton is made or read.",
+                stacklevel=2,
+            )
         flip = self.rotations.new_tensor([-1.0, 1.0, 1.0])
         partners = list(self.skeleton.mirror_partners)
         # M R M for the reflection M = diag(-1, 1, 1) is a rotation again.

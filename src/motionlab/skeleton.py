@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import operator
-import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import torch
 from torch import Tensor
 
 from .errors import SkeletonError
+from .roles import find, partners, sided
 
-SIDES = ("left", "right")
+_MIDDLE = 0.02  # metres off a body's middle where a joint without partner is on one side
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,12 +30,16 @@ class Skeleton:
     end_parents : joint that each end site (a fingertip, the top of the head) hangs on.
     end_offsets : (end_sites, 3) metres.
     rotation_orders : per joint the order in which a BVH file lists its Euler angles, as "ZXY".
+    roles : joints by role, as ``{"left_foot": "LFoot"}``, where names are not understood or wrongly;
+        these win. The attribute has the index of each role's joint, as ``{"left_foot": 16}``, in
+        the order of the joints: those given, and those told from names and tree (`motionlab.roles`).
 
     Points are the joints in order, then the end sites in order.
 
     Raises
     ------
-    SkeletonError : the arrays disagree, a name appears twice, or the joints are not a tree.
+    SkeletonError : the arrays disagree, a name appears twice, the joints are not a tree, or `roles`
+        names what is not there.
     """
 
     names: tuple[str, ...]
@@ -44,6 +48,7 @@ class Skeleton:
     end_parents: tuple[int, ...] = ()
     end_offsets: Tensor = field(default_factory=lambda: torch.zeros(0, 3))
     rotation_orders: tuple[str, ...] = ()
+    roles: Mapping[str, str] | None = None
 
     def __post_init__(self) -> None:
         set_ = lambda name, value: object.__setattr__(self, name, value)
@@ -55,6 +60,7 @@ class Skeleton:
         orders = _words(self.rotation_orders, "rotation_orders")
         set_("rotation_orders", orders or ("ZXY",) * len(self.names))
         self._check()
+        set_("roles", find(self.names, self.parents, self.roles))
 
     def _check(self) -> None:
         count = len(self.names)
@@ -115,9 +121,16 @@ class Skeleton:
         return self.parents + self.end_parents
 
     def index(self, name: str) -> int:
-        """Index of a joint by name, or by role as in ``index("left_foot")``."""
+        """Index of a joint by name, or by role as in ``index("left_foot")``.
+
+        SMPL calls the joint of its toes left_foot: a name wins, and `role` asks for roles alone.
+        """
         if name in self.names:
             return self.names.index(name)
+        return self.role(name)
+
+    def role(self, name: str) -> int:
+        """Index of the joint that has a role, as in ``role("left_foot")``."""
         if isinstance(name, str) and name in self.roles:
             return self.roles[name]
         raise SkeletonError(
@@ -155,25 +168,6 @@ class Skeleton:
 
     # -- meaning ------------------------------------------------------------------------------
 
-    @cached_property
-    def roles(self) -> dict[str, int]:
-        """Joint of each body part that could be told from the names, as ``{"left_foot": 16}``.
-
-        Roles: hips, spine, chest, neck, head, and with ``left_`` or ``right_`` before them
-        shoulder, upper_arm, lower_arm, hand, upper_leg, lower_leg, foot, toes.
-        """
-        found: dict[str, int] = {}
-        for joint, name in enumerate(self.names):
-            role = _role(name)
-            if role is not None:
-                found.setdefault(role, joint)
-        chest = self._common_ancestor(found.get("left_upper_arm"), found.get("right_upper_arm"))
-        if chest:  # a root that carries the arms itself is still the hips
-            found["chest"] = chest
-            if found.get("spine", chest) >= chest:
-                found.pop("spine", None)
-        return dict(sorted(found.items(), key=lambda item: item[1]))
-
     def below(self, role: str, child: str) -> Tensor | None:
         """Where a joint that hangs on another, at any depth, is in its frame, (3,) metres.
 
@@ -189,15 +183,37 @@ class Skeleton:
     @cached_property
     def mirror_partners(self) -> tuple[int, ...]:
         """For each joint the joint on the other side of the body, itself if it is central."""
-        keys = [_split_side(name) for name in self.names]
-        other = {"left": "right", "right": "left"}
-        where: dict[tuple[str | None, str], int] = {}
-        for joint, key in enumerate(keys):
-            where.setdefault(key, joint)  # of two that read alike the first has the partner
-        return tuple(
-            where.get((other[side], base), joint) if side and where[side, base] == joint else joint
-            for joint, (side, base) in enumerate(keys)
-        )
+        return partners(self.names, self.roles)
+
+    @cached_property
+    def without_partner(self) -> tuple[int, ...]:
+        """Joints on one side of the body whose partner on the other is not known.
+
+        Those with a side in their names, and those that lie off the plane in which the partners of
+        the rest pose are mirrored; without any partners, off the plane x = 0 through the hips.
+        """
+        alone = [joint for joint, other in enumerate(self.mirror_partners) if joint == other]
+        marked = sided(self.names)
+        off = self._off_middle()
+        return tuple(joint for joint in alone if marked[joint] or off[joint] > _MIDDLE)
+
+    def _off_middle(self) -> Tensor:
+        """How far in metres each joint (joints,) lies off the body's middle; 0 if that is unknown."""
+        points = torch.zeros(self.joints, 3)
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            points[joint] = points[parent] + self.offsets[joint]
+        pairs = [(a, b) for a, b in enumerate(self.mirror_partners) if a < b]
+        across, middle = torch.tensor([1.0, 0.0, 0.0]), points[self.roles.get("hips", 0)]
+        if pairs:
+            ones, others = (points[list(joints)] for joints in zip(*pairs, strict=True))
+            apart = ones - others
+            apart = apart * (apart @ apart[apart.norm(dim=-1).argmax()]).sign()[:, None]
+            across = torch.nn.functional.normalize(apart.sum(0), dim=0)
+            middle = ((ones + others) / 2).mean(0)
+            mirrored = others + 2 * ((middle - others) @ across)[:, None] * across
+            if (mirrored - ones).norm(dim=-1).median() > _MIDDLE:
+                return torch.zeros(self.joints)  # bones drawn along their axes, say
+        return ((points - middle) @ across).abs()
 
     def mirrored(self) -> Skeleton:
         """The skeleton seen in a mirror that swaps left (+x) and right (-x)."""
@@ -211,11 +227,12 @@ class Skeleton:
             self.end_parents,
             self.end_offsets[ends] * flip,
             self.rotation_orders,
+            self.roles,
         )
 
     def without_end_sites(self) -> Skeleton:
         """The joints alone: what an encoding or a file without tips describes."""
-        return Skeleton(self.names, self.parents, self.offsets, (), (), self.rotation_orders)
+        return replace(self, end_parents=(), end_offsets=torch.zeros(0, 3))
 
     def _end_partners(self, partners: Sequence[int]) -> list[int]:
         """For each end site the one in the same place on the partner of its joint."""
@@ -227,17 +244,6 @@ class Skeleton:
         where = {key: i for i, key in enumerate(zip(self.end_parents, rank, strict=True))}
         keys = [(partners[p], r) for p, r in zip(self.end_parents, rank, strict=True)]
         return [where.get(key, i) for i, key in enumerate(keys)]
-
-    def _common_ancestor(self, a: int | None, b: int | None) -> int | None:
-        if a is None or b is None:
-            return None
-        above = set()
-        while a != -1:
-            above.add(a)
-            a = self.parents[a]
-        while b not in above:
-            b = self.parents[b]
-        return b
 
     @staticmethod
     def canonical() -> Skeleton:
@@ -279,60 +285,6 @@ def _vectors(values: Tensor, what: str) -> Tensor:
     if vectors.ndim != 2 or vectors.shape[1] != 3:
         raise SkeletonError(f"`{what}` has shape {tuple(vectors.shape)}; it must be (n, 3).")
     return vectors
-
-
-# What people call their joints. Matched against the name without its side, lower case, letters
-# only: "LeftUpLeg" -> "upleg", "rThigh" -> "thigh", "UpperArm_L" -> "upperarm".
-_CENTRAL = {
-    "hips": "hips hip pelvis root",
-    "spine": "spine lowerback abdomen tospine torso",
-    "chest": "chest thorax spine1 spine2 upperchest",
-    "neck": "neck",
-    "head": "head",
-}
-_PAIRED = {
-    "shoulder": "shoulder collar clavicle",
-    "upper_arm": "arm upperarm uparm shldr",
-    "lower_arm": "forearm lowerarm elbow",
-    "hand": "hand wrist",
-    "upper_leg": "upleg upperleg thigh",
-    "lower_leg": "leg lowerleg shin calf knee",
-    "foot": "foot ankle",
-    "toes": "toes toe toebase ball",
-}
-_ROLE_OF = {
-    (paired, word): role
-    for paired, table in ((False, _CENTRAL), (True, _PAIRED))
-    for role, words in table.items()
-    for word in words.split()
-}
-
-
-def _split_side(name: str) -> tuple[str | None, str]:
-    """("left", "upleg") from LeftUpLeg, lUpLeg, UpLeg_L, mixamorig:LeftUpLeg; (None, ...) else."""
-    name = name.rsplit(":", 1)[-1]
-    letters = re.sub(r"[^a-z0-9]", "", name.lower())
-    if (False, letters) in _ROLE_OF:  # ROOT is no right "oot"
-        return None, letters
-    for side in SIDES:
-        initial = side[0]
-        patterns = (
-            rf"^{side}[_ .-]?(.+)$",
-            rf"^(.+?)[_ .-]?{side}$",
-            rf"^(?:{initial}|{initial.upper()})(?=[A-Z_ .-])[_ .-]?(.+)$",
-            rf"^(.+)[_ .-](?:{initial}|{initial.upper()})$",
-        )
-        for i, pattern in enumerate(patterns):
-            match = re.match(pattern, name, re.IGNORECASE if i < 2 else 0)
-            if match:
-                return side, re.sub(r"[^a-z0-9]", "", match[1].lower())
-    return None, letters
-
-
-def _role(name: str) -> str | None:
-    side, base = _split_side(name)
-    role = _ROLE_OF.get((side is not None, base))
-    return role if side is None or role is None else f"{side}_{role}"
 
 
 # Name, parent, offset in metres. The feet are as bandai-locomotion's clips hold them in a flat

@@ -16,7 +16,7 @@ from motionlab.ik import solve, twist_error
 from motionlab.ik.limits import HUMAN, read_limits
 from motionlab.ik.turns import place
 from motionlab.io.bvh import parse_bvh
-from motionlab.skeleton import SIDES
+from motionlab.roles import SIDES
 
 CANONICAL = Skeleton.canonical()
 REST = torch.eye(3, dtype=torch.float64).expand(CANONICAL.joints, 3, 3)

@@ -38,12 +38,12 @@ class Body(NamedTuple):
     @staticmethod
     def canonical() -> Body:
         skeleton = Skeleton.canonical()
-        offset = lambda name: skeleton.offsets[skeleton.index(name)].double().numpy()
-        leg = -offset("LeftLowerLeg")[1] - offset("LeftFoot")[1]
-        hip = offset("LeftUpperLeg")
-        tip = skeleton.end_parents.index(skeleton.index("LeftToes"))
+        offset = lambda role: skeleton.offsets[skeleton.role(role)].double().numpy()
+        leg = -offset("left_lower_leg")[1] - offset("left_foot")[1]
+        hip = offset("left_upper_leg")
+        tip = skeleton.end_parents.index(skeleton.role("left_toes"))
         length = float(skeleton.end_offsets[tip].norm())
-        return Body(skeleton, leg, hip[0], -hip[1], offset("LeftToes"), length)
+        return Body(skeleton, leg, hip[0], -hip[1], offset("left_toes"), length)
 
 
 class Style(NamedTuple):
@@ -227,7 +227,9 @@ def _legs(body: Body, pose: Pose, feet: dict[str, Foot]) -> dict[str, tuple]:
         hips.append(pose.root + below)
         ankles.append(feet[side].ankle)
         knees.append(np.stack([np.sin(between), 0 * between, np.cos(between)], -1))
-    offsets = [body.skeleton.offsets[body.skeleton.index(f"Left{j}")] for j in ("LowerLeg", "Foot")]
+    offsets = [
+        body.skeleton.offsets[body.skeleton.role(f"left_{j}")] for j in ("lower_leg", "foot")
+    ]
     both = [torch.from_numpy(np.stack(points)) for points in (hips, ankles, knees)]
     thighs, shanks = (turns.numpy() for turns in two_bone(*both, *offsets))
     return {side: (thighs[i], thighs[i] @ shanks[i]) for i, side in enumerate(SIDES)}

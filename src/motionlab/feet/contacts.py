@@ -125,7 +125,7 @@ def foot_points(skeleton: Skeleton) -> list[int]:
     """
     found = []
     for side in ("left", "right"):
-        foot = skeleton.index(f"{side}_foot")
+        foot = skeleton.role(f"{side}_foot")
         ends = [skeleton.joints + i for i, p in enumerate(skeleton.end_parents) if p == foot]
         found += [foot, skeleton.roles.get(f"{side}_toes", ends[0] if ends else foot)]
     return found

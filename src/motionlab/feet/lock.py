@@ -298,7 +298,7 @@ def _knee_direction(points: Tensor, world: Tensor, upper: int, lower: int, foot:
 
 def _legs(skeleton: Skeleton) -> dict[str, list[int]]:
     """Joints of both legs, left first: {part: [left, right]}; toes as `contacts.foot_points`."""
-    joints = {part: [skeleton.index(f"{s}_{part}") for s in SIDES] for part in PARTS[:3]}
+    joints = {part: [skeleton.role(f"{s}_{part}") for s in SIDES] for part in PARTS[:3]}
     return joints | {"toes": [foot_points(skeleton)[1], foot_points(skeleton)[3]]}
 
 

@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 
 from ..errors import IkError
-from ..skeleton import SIDES, Skeleton
+from ..roles import SIDES
+from ..skeleton import Skeleton
 from .hinge import STRAIGHT, Hinge
 from .turns import place, turn_about, unit
 

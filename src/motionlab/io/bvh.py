@@ -11,7 +11,7 @@ import os
 import re
 import tempfile
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,7 @@ def read_bvh(
     tpose_first: bool = False,
     drop_zeros: bool = False,
     source: str = "",
+    roles: Mapping[str, str] | None = None,
 ) -> Motion:
     """Read a BVH file.
 
@@ -55,6 +56,7 @@ def read_bvh(
     tpose_first : frame 0 is a T-pose for calibration; leave it out.
     drop_zeros : leave out leading frames in which every rotation is zero.
     source : kept as ``motion.source``.
+    roles : joints by role, as ``{"left_foot": "LFoot"}``, where names are not understood or wrongly.
 
     The root's position channels replace its OFFSET. A root that does nothing but carry the body
     (``joint_Root`` above ``Hips``) is folded into it; what else hangs there, such as an engine's
@@ -71,7 +73,7 @@ def read_bvh(
     ------
     BvhError : the file can't be read; the message names file, line and remedy.
     """
-    how = Reading(units, fps, tpose_first, drop_zeros, up, root, rigid)
+    how = Reading(units, fps, tpose_first, drop_zeros, up, root, rigid, roles)
     motion, doubts = read(path, how, source)
     _warn(path, doubts)
     return motion

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import pybvh
 import torch
 from pybvh.bvhnode import BvhNode
 
-from ..errors import BvhError
+from ..errors import BvhError, SkeletonError
 from ..motion import Motion
 from ..skeleton import Skeleton
 from .bvh_header import Layout, Tree
@@ -41,6 +42,7 @@ class Reading:
     up: str | None = None
     root: str | None = None
     rigid: str | None = None
+    roles: Mapping[str, str] | None = None
 
     def __post_init__(self) -> None:
         in_metres(self.units)
@@ -87,11 +89,20 @@ def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, D
     body = _Body(nodes, tree, where, metres)
     shifts = {joint: shift[skip:] * metres for joint, shift in shifts.items()}
     motion = body.motion(angles[skip:], shifts, how.rigid == "mean", float(rate), source)
-    motion = turn_up(motion, how.up)
+    motion = _with_roles(turn_up(motion, how.up), how, where)
     doubts |= body.doubts
     doubts["units"] = doubt_units(motion.skeleton, how.units)
     doubts["up"] = doubt_up(motion) if how.up is None else None
     return motion, {about: said for about, said in doubts.items() if said}
+
+
+def _with_roles(motion: Motion, how: Reading, where) -> Motion:
+    if how.roles is None:
+        return motion
+    try:
+        return replace(motion, skeleton=replace(motion.skeleton, roles=how.roles))
+    except SkeletonError as error:
+        raise BvhError(f"{where}: {error}") from error
 
 
 def _doubt_count(layout: Layout, rows: int, text: str) -> str | None:

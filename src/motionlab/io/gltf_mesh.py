@@ -17,7 +17,8 @@ import torch
 from ..kinematics import heading, yaw_matrix
 from ..motion import Motion
 from ..retargeting.rest_alignment import stands
-from ..skeleton import SIDES, Skeleton
+from ..roles import SIDES
+from ..skeleton import Skeleton
 
 INFLUENCES = 4  # joints that may carry a vertex, as many as every program reads
 _STANDING = {

@@ -175,7 +175,7 @@ def _effector(skeleton: Skeleton, roles: tuple[str, ...]) -> int:
     for role in roles:
         if role in skeleton.roles:
             return skeleton.roles[role]
-    return skeleton.index(roles[0])  # which says what is there
+    return skeleton.role(roles[0])  # which says what is there
 
 
 def _listed(clips: Sequence[Tensor]) -> list[Tensor]:

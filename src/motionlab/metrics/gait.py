@@ -7,7 +7,8 @@ import torch
 from torch import Tensor
 
 from ..feet.contacts import foot_points, velocities
-from ..skeleton import SIDES, Skeleton
+from ..roles import SIDES
+from ..skeleton import Skeleton
 from .checks import check_contacts, check_positions, check_positive, check_rate, check_skeleton
 
 
@@ -75,8 +76,8 @@ def facing(positions: Tensor, skeleton: Skeleton) -> Tensor:
     """
     positions = check_skeleton(positions, skeleton)
     across = sum(
-        positions[..., skeleton.index(f"left_{part}"), :]
-        - positions[..., skeleton.index(f"right_{part}"), :]
+        positions[..., skeleton.role(f"left_{part}"), :]
+        - positions[..., skeleton.role(f"right_{part}"), :]
         for part in ("upper_leg", "upper_arm")
     )
     return torch.atan2(-across[..., 2], across[..., 0])  # across x up is forward

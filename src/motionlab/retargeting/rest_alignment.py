@@ -22,7 +22,8 @@ import torch
 from torch import Tensor
 
 from ..ik.turns import shortest_turn
-from ..skeleton import SIDES, Skeleton
+from ..roles import SIDES
+from ..skeleton import Skeleton
 
 if TYPE_CHECKING:
     from ..motion import Motion

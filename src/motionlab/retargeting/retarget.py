@@ -31,7 +31,8 @@ from ..errors import RetargetError
 from ..feet.planting import Foot, bridged, find_contacts, levelled, plant
 from ..ik import two_bone
 from ..ik.turns import shortest_turn
-from ..skeleton import SIDES, Skeleton
+from ..roles import SIDES
+from ..skeleton import Skeleton
 from .rest_alignment import ELBOW, SHORT, alignment, bone, rest_points, stands
 
 if TYPE_CHECKING:
@@ -100,9 +101,11 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
     for name, its in (("motion's skeleton", motion.skeleton), ("target skeleton", skeleton)):
         missing = [role for role in NEEDED if role not in its.roles]
         if missing:
+            found = ", ".join(f"{role} = {its.names[joint]}" for role, joint in its.roles.items())
             raise RetargetError(
                 f"The {name} has no joint for {', '.join(missing)}; its joints are "
-                f"{', '.join(its.names)}. Rename them to what `Skeleton.roles` knows."
+                f"{', '.join(its.names)}. Understood: {found or 'none'}. Say the others where the "
+                f"skeleton is made or read, as read_bvh(path, roles={{{missing[0]!r}: 'NAME'}})."
             )
         for joint, child in _BONES:
             offset = its.below(joint, child)

@@ -79,8 +79,9 @@ def trail_of(trail: str | int | Sequence[str | int] | None, tracks: list[Track])
     """Points that leave a trail; by default hips and toes, or feet where a body has no toes."""
     if trail is None:
         toes = ("left_toes", "right_toes")
-        roles = tracks[0].skeleton.roles
-        trail = ["hips", *(t if t in roles else t.replace("toes", "foot") for t in toes)]
+        body = tracks[0].skeleton
+        toes = [toe if toe in body.roles else toe.replace("toes", "foot") for toe in toes]
+        trail = [body.role(role) for role in ("hips", *toes)]
     return trail_points(trail, tracks)
 
 

@@ -152,7 +152,7 @@ def _encoding(encoding: Encoding) -> dict[str, Any]:
     if isinstance(encoding, RootRelative):
         # a row of ones has the root at a height of one unit
         metres = encoding.positions(torch.ones(1, encoding.dim, dtype=torch.float64))[0, 0, 1]
-        legs = [skeleton.index(f"{side}_upper_leg") for side in ("left", "right")]
+        legs = [skeleton.role(f"{side}_upper_leg") for side in ("left", "right")]
         return {
             "kind": "RootRelative",
             "points": encoding.points,

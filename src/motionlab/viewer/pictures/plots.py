@@ -352,7 +352,7 @@ def feet(motion: Motion, threshold: float = 0.45) -> Figure:
     positions = motion.positions()
     for row, (side, color) in enumerate(zip(("left", "right"), palette.CYCLE, strict=False)):
         role = f"{side}_toes" if f"{side}_toes" in motion.skeleton.roles else f"{side}_foot"
-        toe = positions[:, motion.skeleton.index(role)].numpy()
+        toe = positions[:, motion.skeleton.role(role)].numpy()
         pace = np.linalg.norm(np.gradient(toe, axis=0), axis=-1) * motion.fps
         height.plot(time, toe[:, 1] * 100, color=color, label=f"{side} toe")
         speed.plot(time, pace, color=color)
