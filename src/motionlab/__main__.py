@@ -13,6 +13,7 @@ import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from .commands.evaluate import Evaluate
+from .commands.info import Info
 from .commands.reproduce import Reproduce
 from .commands.sample import Sample
 from .commands.train import Train
@@ -187,6 +188,7 @@ class Prepare:
 
 COMMANDS = (
     Annotated[Data, subcommand("data")]
+    | Annotated[Info, subcommand("info")]
     | Annotated[Prepare, subcommand("prepare")]
     | Annotated[Train, subcommand("train")]
     | Annotated[Evaluate, subcommand("evaluate")]

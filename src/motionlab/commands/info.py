@@ -1,0 +1,166 @@
+"""`motionlab info`: what is in a BVH file, and which joint was understood as what."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from ..errors import BvhError, MotionLabError
+from ..roles import ALL, SIDES, read
+
+if TYPE_CHECKING:
+    from ..motion import Motion
+    from ..skeleton import Skeleton
+
+
+@dataclass
+class Info:
+    """What is in a BVH file, and which joint is understood as what; a line a file for a folder."""
+
+    path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
+    """BVH file, or a folder of them."""
+    roles: Annotated[Path | None, arg(metavar="TABLE")] = None
+    """TOML or JSON file that says which joint is which, as this command prints it."""
+    units: float | str = "cm"
+    """The file's unit: m, cm, mm, in, ft, or metres per unit."""
+
+    def run(self) -> None:
+        given = None if self.roles is None else read(self.roles)
+        print(describe(self.path, roles=given, units=self.units))
+
+
+def describe(
+    path: str | os.PathLike,
+    *,
+    roles: Mapping[str, str] | None = None,
+    units: str | float = "cm",
+) -> str:
+    """What is in a BVH file: sizes, and each joint with its role.
+
+    Parameters
+    ----------
+    path : the file, or a folder, of which each file gets one line, faults included.
+    roles, units : as `motionlab.read_bvh` takes them.
+
+    Returns
+    -------
+    text : of a file a TOML table of its roles, all else in comments. Mended and written to a file
+        it can be given back: ``roles=motionlab.roles.read("my_rig.toml")``.
+
+    Raises
+    ------
+    BvhError, SkeletonError : the file can't be read, `roles` do not fit it, or a folder has no BVH
+        file.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        motion, doubts = _read(path, roles, units)
+        return "\n".join([*_sizes(motion, doubts), "#", *_table(motion.skeleton)])
+    files = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".bvh")
+    if not files:
+        raise BvhError(f"{path}: holds no .bvh file; name a BVH file or a folder of them.")
+    return "\n".join(_line(file, file.relative_to(path), roles, units) for file in files)
+
+
+def _read(
+    path: Path, roles: Mapping[str, str] | None, units: str | float
+) -> tuple[Motion, list[str]]:
+    """A motion, and what reading it warned of."""
+    from ..io import read_bvh
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        motion = read_bvh(path, roles=roles, units=units)
+    return motion, [str(each.message) for each in told]
+
+
+def _line(file: Path, name: Path, roles: Mapping[str, str] | None, units: str | float) -> str:
+    """One file of a folder in one line."""
+    try:
+        motion, doubts = _read(file, roles, units)
+    except MotionLabError as error:
+        return f"{name}: FAULT {error}"
+    missing = _missing(motion.skeleton)
+    said = f"lacks {', '.join(missing)}" if missing else "has all roles that retargeting needs"
+    return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", said, *doubts])
+
+
+def _counts(motion: Motion) -> str:
+    return (
+        f"{motion.skeleton.joints} joints, {len(motion)} frames, {motion.seconds:.2f} s, "
+        f"{motion.fps:g} fps"
+    )
+
+
+def _size(motion: Motion) -> str:
+    """How large the body is: along its bones if that can be told, else as it is seen first."""
+    s = motion.skeleton
+    feet = [s.roles[f"{side}_foot"] for side in SIDES if f"{side}_foot" in s.roles]
+    if feet and "head" in s.roles:
+        apart = _above(s, s.role("head")) ^ _above(s, feet[0])
+        return f"{sum(float(s.offsets[joint].norm()) for joint in apart):.2f} m from foot to head"
+    heights = motion[:1].positions()[0, :, 1]
+    return f"{float(heights.max() - heights.min()):.2f} m high in its first frame"
+
+
+def _above(skeleton: Skeleton, joint: int) -> set[int]:
+    """A joint and those it hangs on."""
+    found = set()
+    while joint >= 0:
+        found.add(joint)
+        joint = skeleton.parents[joint]
+    return found
+
+
+def _missing(skeleton: Skeleton) -> list[str]:
+    """Roles that retargeting needs and that no joint has."""
+    from ..retargeting.retarget import NEEDED
+
+    return [role for role in NEEDED if role not in skeleton.roles]
+
+
+def _sizes(motion: Motion, doubts: list[str]) -> list[str]:
+    found = [f"{motion.name}: {_counts(motion)}, {_size(motion)}", *doubts]
+    return [f"# {' '.join(line.split())}" for line in found]
+
+
+def _table(skeleton: Skeleton) -> list[str]:
+    """Each joint with its role as a line of TOML; what has none, and what is missing, in comments."""
+    role_of = {joint: role for role, joint in skeleton.roles.items()}
+    lines = [
+        f"{'' if joint in role_of else '# '}{role_of.get(joint, 'ROLE')} = {_quoted(name)}"
+        for joint, name in enumerate(skeleton.names)
+    ]
+    lines += [f'{role} = ""' for role, name in skeleton.roles.given.items() if not name]
+    missing = _missing(skeleton)
+    lines += [
+        "#",
+        "# Retargeting has all the roles that it needs."
+        if not missing
+        else "# Retargeting needs also:",
+    ]
+    lines += [f'# {role} = "NAME"' for role in missing]
+    others = [
+        role for role in ALL if role not in {*skeleton.roles, *skeleton.roles.given, *missing}
+    ]
+    if others:
+        lines.append(f"# There may also be: {', '.join(others)}.")
+    if skeleton.without_partner:
+        alone = ", ".join(_quoted(skeleton.names[joint]) for joint in skeleton.without_partner)
+        lines.append(f"# On one side, without a partner on the other: {alone}.")
+    return [
+        *lines,
+        '# To mend this, keep it as my_rig.toml with the lines changed (a role that no joint has is "");',
+        "# --roles my_rig.toml, or read_bvh(FILE, roles=motionlab.roles.read('my_rig.toml')), reads it.",
+    ]
+
+
+def _quoted(name: str) -> str:
+    return json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,97 @@
+"""`motionlab info`: what is in a file, and a table of roles that can be given back."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+import rig_names
+
+from motionlab import read_bvh, roles, write_bvh
+from motionlab.__main__ import main
+from motionlab.commands.info import describe
+from motionlab.datasets import gaits
+from motionlab.errors import BvhError, SkeletonError
+
+
+@pytest.fixture
+def walk(tmp_path):
+    """A clip whose left ankle and hand are called as nobody calls them."""
+    motion = gaits.make(seconds=1, name="walk")
+    names = [{"LeftFoot": 'Paw "1"', "LeftHand": "Claw"}.get(n, n) for n in motion.skeleton.names]
+    path = tmp_path / "walk.bvh"
+    write_bvh(rig_names.renamed(motion, names), path)
+    return path
+
+
+def test_what_it_says_of_a_file(walk):
+    text = describe(walk)
+    assert text.startswith(
+        "# walk: 21 joints, 30 frames, 1.00 s, 30 fps, 1.34 m from foot to head\n"
+    )
+    assert 'left_lower_leg = "LeftLowerLeg"\n# ROLE = "Paw_\\"1\\""\nleft_toes = ' in text
+    needs = text[text.index("needs also") :]
+    assert '# left_hand = "NAME"\n# left_foot = "NAME"\n' in needs and "right_hand" not in needs
+    # the hands keep their side in the mirror, which makes a body of it that is none
+    assert 'without a partner on the other: "Claw", "RightHand", "Paw_' in text
+
+
+def test_it_can_be_mended_and_given_back(walk, tmp_path, capsys):
+    table = tmp_path / "rig.toml"
+    text = describe(walk).replace('# left_hand = "NAME"', 'left_hand = "Claw"')
+    text = text.replace('# ROLE = "Paw', 'left_foot = "Paw').replace("left_toes", "# left_toes")
+    table.write_text(text + '\nleft_toes = ""\n', encoding="utf-8")
+    given = roles.read(table)
+    assert given["left_foot"] == 'Paw_"1"'
+    assert main(["info", str(walk), "--roles", str(table)]) == 0
+    printed = capsys.readouterr().out
+    assert "Retargeting has all the roles" in printed and "without a partner" not in printed
+    assert tomllib.loads(printed) == given
+    motion = read_bvh(walk, roles=given)
+    assert motion.skeleton.roles.given == given and "left_toes" not in motion.skeleton.roles
+    assert len(motion.retarget()) == 30
+
+
+def test_a_body_that_is_not_understood_has_a_size_all_the_same(tmp_path):
+    motion = gaits.make(seconds=0.2)
+    odd = rig_names.renamed(motion, [f"bone {joint}" for joint in range(21)])
+    write_bvh(odd, tmp_path / "odd.bvh")
+    text = describe(tmp_path / "odd.bvh")
+    height = float(text.split(" fps, ")[1].split(" m high in its first frame")[0])
+    assert 1.5 < height < 1.8
+    assert tomllib.loads(text) == {}
+
+
+def test_a_folder_has_a_line_for_each_file(walk, tmp_path, capsys):
+    deep = tmp_path / "more"
+    deep.mkdir()
+    whole = gaits.make(seconds=1)
+    write_bvh(whole, deep / "whole.bvh")
+    write_bvh(whole, deep / "giant.bvh", units=0.001)
+    (tmp_path / "bad.BVH").write_text("HIERARCHY\n")
+    (tmp_path / "notes.txt").write_text("no clip")
+    assert main(["info", str(tmp_path)]) == 0
+    bad, giant, right, lacking = capsys.readouterr().out.splitlines()
+    assert bad.startswith("bad.BVH: FAULT ") and "bad.BVH" in bad[15:]
+    assert "; has all roles that retargeting needs; " in giant and "pass another unit" in giant
+    assert right.endswith(
+        ": 21 joints, 30 frames, 1.00 s, 30 fps, 1.34 m from foot to head; has all roles that retargeting needs"
+    )
+    assert lacking.startswith("walk.bvh: ") and lacking.endswith("; lacks left_hand, left_foot")
+    assert main(["info", str(tmp_path), "--units", "0.01"]) == 0
+    assert capsys.readouterr().out.splitlines()[2] == right
+
+
+def test_what_it_can_not_do(walk, tmp_path, capsys):
+    with pytest.raises(BvhError, match="can't be opened"):
+        describe(tmp_path / "none.bvh")
+    with pytest.raises(SkeletonError, match="no such joint"):
+        describe(walk, roles={"head": "Kopf"})
+    (tmp_path / "empty").mkdir()
+    for wrong, said in (
+        (["info", str(tmp_path / "empty")], "holds no .bvh file"),
+        (["info", str(walk), "--units", "ells"], "Unknown unit 'ells'"),
+        (["info", str(walk), "--roles", "none.toml"], "can't be opened"),
+    ):
+        assert main(wrong) == 1
+        assert said in capsys.readouterr().err
