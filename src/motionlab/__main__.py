@@ -166,12 +166,15 @@ class Prepare:
     """Name of the ROOT to read, of a folder's files that hold several bodies."""
     rigid: str | None = None
     """mean: put joints that slide against their parents at their mean offset; refused if left out."""
+    roles: Path | None = None
+    """TOML or JSON file that says which joint is which in a folder's files, as `info` prints it."""
     skip_bad: bool = False
     """Leave out a folder's files that can't be read or brought to the canonical skeleton."""
     out: Path | None = None
     """File to write; runs/NAME.npz, or runs/NAME-permissive.npz, if left out."""
 
     def run(self) -> None:
+        from . import roles
         from .training import prepare
         from .training.prepared import file_of
 
@@ -179,6 +182,8 @@ class Prepare:
         units = None if self.units is None else _number_or(self.units)
         reading = {"units": units, "up": self.up, "root": self.root, "rigid": self.rigid,
                    "skip_bad": self.skip_bad or None}  # fmt: skip
+        if self.roles is not None:
+            reading["roles"] = roles.read(self.roles)
         reading = {name: value for name, value in reading.items() if value is not None}
         prepared = prepare(self.source, progress=True, permissive=self.permissive, **reading)
         prepared.save(out)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from motionlab import Skeleton, datasets, write_bvh
+from motionlab import Skeleton, datasets, roles, write_bvh
 from motionlab.__main__ import main
+from motionlab.datasets import gaits as made
 from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import DataError, TrainingError
 from motionlab.training import Prepared, prepare
@@ -220,3 +221,27 @@ def _folder(name: str) -> Path:
 def test_how_named_data_are_read_is_no_question():
     with pytest.raises(DataError, match="leave out units"):
         prepare("gaits", units="m")
+
+
+def test_a_folder_of_a_rig_with_names_of_its_own_is_read_by_a_table_of_roles(tmp_path, capsys):
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    plain = made.make(seconds=2, speed=1.2)
+    odd = tuple(f"bone{joint}" for joint in range(plain.skeleton.joints))
+    for clip in range(12):
+        motion = made.make(seconds=2, speed=1.2 + clip / 20)
+        skeleton = replace(motion.skeleton, names=odd)
+        write_bvh(replace(motion, skeleton=skeleton), folder / f"walk_{clip}.bvh")
+    assert main(["prepare", str(folder), "--out", str(tmp_path / "made.npz")]) == 1
+    assert "walk_0.bvh" in capsys.readouterr().err
+    table = "".join(f'{role} = "bone{joint}"\n' for role, joint in plain.skeleton.roles.items())
+    (tmp_path / "rig.toml").write_text(table)
+    given = ["--roles", str(tmp_path / "rig.toml"), "--out", str(tmp_path / "made.npz")]
+    assert main(["prepare", str(folder), *given]) == 0
+    clip = datasets.from_folder(folder, roles=roles.read(tmp_path / "rig.toml"))[0].retarget()
+    expected = made.make(seconds=2, speed=1.2)
+    assert (clip.positions() - expected.positions()).norm(dim=-1).max() < 0.02
+    (tmp_path / "rig.toml").write_text('hips = "Becken"\n')
+    assert main(["prepare", str(folder), *given]) == 1
+    said = capsys.readouterr().err
+    assert "walk_0.bvh" in said and "no such joint" in said

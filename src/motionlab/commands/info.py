@@ -29,25 +29,27 @@ class Info:
     roles: Annotated[Path | None, arg(metavar="TABLE")] = None
     """TOML or JSON file that says which joint is which, as this command prints it."""
     units: float | str = "cm"
-    """The file's unit: m, cm, mm, in, ft, or metres per unit."""
+    """The file's unit: m, dm, cm, mm, in, ft, or metres per unit."""
+    up: str | None = None
+    """The file's axis that points up: y, z, x, or with a minus, as --up=-z."""
+    root: str | None = None
+    """Name of the ROOT to read, of a file that holds several bodies."""
+    rigid: str | None = None
+    """mean: put joints that slide against their parents at their mean offset."""
 
     def run(self) -> None:
         given = None if self.roles is None else read(self.roles)
-        print(describe(self.path, roles=given, units=self.units))
+        reading = {"units": self.units, "up": self.up, "root": self.root, "rigid": self.rigid}
+        print(describe(self.path, roles=given, **reading))
 
 
-def describe(
-    path: str | os.PathLike,
-    *,
-    roles: Mapping[str, str] | None = None,
-    units: str | float = "cm",
-) -> str:
+def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None, **reading) -> str:
     """What is in a BVH file: sizes, and each joint with its role.
 
     Parameters
     ----------
     path : the file, or a folder, of which each file gets one line, faults included.
-    roles, units : as `motionlab.read_bvh` takes them.
+    roles, reading : as `motionlab.read_bvh` takes them.
 
     Returns
     -------
@@ -56,35 +58,32 @@ def describe(
 
     Raises
     ------
-    BvhError, SkeletonError : the file can't be read, `roles` do not fit it, or a folder has no BVH
-        file.
+    BvhError : the file can't be read, `roles` do not fit it, or a folder has no BVH file.
     """
     path = Path(path)
     if not path.is_dir():
-        motion, doubts = _read(path, roles, units)
+        motion, doubts = _read(path, roles, reading)
         return "\n".join([*_sizes(motion, doubts), "#", *_table(motion.skeleton)])
     files = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".bvh")
     if not files:
         raise BvhError(f"{path}: holds no .bvh file; name a BVH file or a folder of them.")
-    return "\n".join(_line(file, file.relative_to(path), roles, units) for file in files)
+    return "\n".join(_line(file, file.relative_to(path), roles, reading) for file in files)
 
 
-def _read(
-    path: Path, roles: Mapping[str, str] | None, units: str | float
-) -> tuple[Motion, list[str]]:
+def _read(path: Path, roles: Mapping[str, str] | None, reading: dict) -> tuple[Motion, list[str]]:
     """A motion, and what reading it warned of."""
     from ..io import read_bvh
 
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        motion = read_bvh(path, roles=roles, units=units)
+        motion = read_bvh(path, roles=roles, **reading)
     return motion, [str(each.message) for each in told]
 
 
-def _line(file: Path, name: Path, roles: Mapping[str, str] | None, units: str | float) -> str:
+def _line(file: Path, name: Path, roles: Mapping[str, str] | None, reading: dict) -> str:
     """One file of a folder in one line."""
     try:
-        motion, doubts = _read(file, roles, units)
+        motion, doubts = _read(file, roles, reading)
     except MotionLabError as error:
         return f"{name}: FAULT {error}"
     missing = _missing(motion.skeleton)

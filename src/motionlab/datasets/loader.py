@@ -6,7 +6,7 @@ import functools
 import os
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -176,6 +176,7 @@ def from_folder(
     fps: float | None = None,
     root: str | None = None,
     rigid: str | None = None,
+    roles: Mapping[str, str] | None = None,
     pattern: str = BVH_FILES,
     tpose_first: bool = False,
     drop_zeros: bool = False,
@@ -187,8 +188,8 @@ def from_folder(
     Parameters
     ----------
     path : the folder.
-    units, up, fps, root, rigid, tpose_first, drop_zeros : as for `motionlab.read_bvh`, for all files
-        alike. What is doubtful about files, such as their units, is said once, with their number.
+    units, up, fps, root, rigid, roles, tpose_first, drop_zeros : as for `motionlab.read_bvh`, for
+        all files alike. What is doubtful about files, such as their units, is said once, with their number.
     pattern : which files, as for `pathlib.Path.glob`.
     split : only the files of this split; which are in it depends on the files' names alone.
     skip_bad : leave out files that can't be read, with a warning, instead of raising.
@@ -205,7 +206,7 @@ def from_folder(
     """
     found = read_folder(
         path, pattern=pattern, split=split, skip_bad=skip_bad, units=units, up=up, fps=fps,
-        root=root, rigid=rigid, tpose_first=tpose_first, drop_zeros=drop_zeros,
+        root=root, rigid=rigid, roles=roles, tpose_first=tpose_first, drop_zeros=drop_zeros,
     )  # fmt: skip
     return [motion for _, motion in found]
 
