@@ -95,7 +95,7 @@ def side_by_side(some: list[chapters.Chapter], jobs: int) -> float:
     with tempfile.TemporaryDirectory() as store:
         begin = time.perf_counter()
         fresh = [chapters.Chapter(chapter.path, Path(store)) for chapter in some]
-        chapters.execute(fresh, "", jobs, lambda said: None)
+        chapters.execute(fresh, {}, jobs, lambda said: None)
         return time.perf_counter() - begin
 
 

@@ -7,13 +7,17 @@ book/package-lock.json, once, and are copied into the pages.
 """
 
 import argparse
+import contextlib
 import errno
 import hashlib
+import io
 import os
 import shutil
 import signal
 import sys
 import time
+import warnings
+from collections import Counter
 from collections.abc import Sequence
 
 import chapters
@@ -59,7 +63,9 @@ def vendor() -> None:
         shutil.copyfile(modules / source, VENDOR / name)
 
 
-def outdated(found: Sequence[Chapter], around: str, again: Sequence[str] | None) -> list[Chapter]:
+def outdated(
+    found: Sequence[Chapter], around: dict[str, str], again: Sequence[str] | None
+) -> list[Chapter]:
     """Chapters to execute: those that did not run well on what there is now, and those asked for.
 
     again : beginnings of names; empty for all, None for none.
@@ -71,9 +77,9 @@ def outdated(found: Sequence[Chapter], around: str, again: Sequence[str] | None)
     return [c for c in found if asked(c) or not chapters.good(c, around)]
 
 
-def made_of(found: Sequence[Chapter], around: str) -> str:
+def made_of(found: Sequence[Chapter], around: dict[str, str]) -> str:
     """Hash of all that the pages are made of."""
-    hashed = hashlib.sha256(around.encode())
+    hashed = hashlib.sha256(repr(around).encode())
     for path in sorted(chapters.files_below([BOOK, ROOT / "notebooks"])):
         if path.relative_to(ROOT).parts[1] not in ("_build", "vendor", "node_modules"):
             hashed.update(str(path).encode() + path.read_bytes())
@@ -93,8 +99,12 @@ def make_pages(found: Sequence[Chapter]) -> bool:
         cache.cache_notebook_bundle(CacheBundleIn(page, str(chapter.path)), check_validity=False)
     command = ["build", str(ROOT), "--config", "book/_config.yml", "--toc", "book/_toc.yml"]
     command += ["--path-output", str(BOOK), "-W", "--keep-going", "--all", "-q"]
+    warnings.filterwarnings(
+        "ignore", category=FutureWarning
+    )  # torch's, of what Sphinx looks through
     try:
-        jupyter_book(command, standalone_mode=False)
+        with contextlib.redirect_stdout(io.StringIO()):  # jupyter-book's own, which knows half
+            jupyter_book(command, standalone_mode=False)
     except RuntimeError as error:  # jupyter-book's, after the warnings
         cause = error.__cause__
         if isinstance(cause, OSError) and cause.errno in FULL:
@@ -104,15 +114,28 @@ def make_pages(found: Sequence[Chapter]) -> bool:
     return True
 
 
-def build(again: Sequence[str] | None, jobs: int) -> None:
-    begin = time.monotonic()
-    os.chdir(ROOT)
-    vendor()
-    found, around = chapters.find(), chapters.surroundings()
-    wanted = outdated(found, around, again)
+def _announce(
+    found: Sequence[Chapter], wanted: Sequence[Chapter], around: dict[str, str], jobs: int
+) -> None:
+    """Say what will be executed, why, and for how long if that is known."""
     kept = len(found) - len(wanted)
     say(f"{len(found)} pages hold code: {kept} are as they were, {len(wanted)} to execute"
         + (f", {jobs} at a time." if wanted else "."))  # fmt: skip
+    reasons = Counter(chapters.why(chapter, around) or "asked for" for chapter in wanted)
+    for reason, count in reasons.items():
+        say(f"  {count}: {reason}")
+    seconds = [chapter.record.get("processor_seconds") for chapter in wanted]
+    if wanted and all(seconds):
+        say(f"  about {sum(seconds) / jobs / 60:.1f} minutes, if nothing else runs here")
+
+
+def build(again: Sequence[str] | None, jobs: int) -> None:
+    begin = time.monotonic()
+    os.chdir(ROOT)
+    found, around = chapters.find(), chapters.surroundings()
+    wanted = outdated(found, around, again)
+    vendor()
+    _announce(found, wanted, around, jobs)
     chapters.execute(wanted, around, jobs, say)
     bad = [chapter for chapter in found if not chapters.good(chapter, around)]
     failed = [chapter for chapter in bad if chapter.record.get("error")]
@@ -125,8 +148,8 @@ def build(again: Sequence[str] | None, jobs: int) -> None:
     well = make_pages(found)
     if failed:
         sys.exit(
-            f"\n{len(failed)} of {len(found)} chapters FAILED; the others are built, and of these all "
-            f"up to there.\n\n{chr(10).join(map(chapters.told, failed))}\n\n"
+            f"\n{len(failed)} of {len(found)} pages with code FAILED. The book is built, {INDEX.relative_to(ROOT)};"
+            f" of what failed, up to its error.\n\n{chr(10).join(map(chapters.told, failed))}\n\n"
             "After mending, `make book` executes what failed or changed."
         )
     if bad:
@@ -150,7 +173,9 @@ def main() -> None:
     try:
         build(options.again, max(1, options.jobs))
     except KeyboardInterrupt:
-        say("\nInterrupted. The chapters that were done are kept: `make book` goes on from there.")
+        say(
+            "\nInterrupted. What was done is kept, what was at work begins anew: `make book` goes on."
+        )
         sys.exit(130)
     except OSError as error:
         if error.errno not in FULL:

@@ -71,9 +71,12 @@ class Chapter:
 
     @property
     def shown(self) -> str:
-        return (
-            self.path.relative_to(ROOT).as_posix() if ROOT in self.path.parents else str(self.path)
-        )
+        return _shown(self.path)
+
+
+def _shown(path: Path) -> str:
+    """A path as one would write it in the repository's root."""
+    return path.relative_to(ROOT).as_posix() if ROOT in path.parents else str(path)
 
 
 def sources(page: nbformat.NotebookNode) -> list[str]:
@@ -91,17 +94,20 @@ def find() -> list[Chapter]:
 # -- what decides what comes out ------------------------------------------------------------------
 
 
-def surroundings() -> str:
-    """Hash of what all pages stand on: the library, results, installed packages, data at hand."""
-    found = hashlib.sha256(f"{FORMAT} {sys.version}".encode())
+def surroundings() -> dict[str, str]:
+    """Hashes of what all pages stand on, by what it is."""
     packages = {(d.name, d.version) for d in importlib.metadata.distributions()}
     settings = {(k, v) for k, v in os.environ.items() if k.startswith("MOTIONLAB_")}
-    found.update(repr([sorted(packages), sorted(settings)]).encode())
-    for path in sorted(files_below(ROOT / folder for folder in READS)):
-        found.update(f"{path.relative_to(ROOT)} ".encode() + path.read_bytes())
-    for path, size, changed in data_at_hand():
-        found.update(f"{path} {size} {changed}\n".encode())
-    return found.hexdigest()
+    found = {
+        "installed packages": [sys.version, *sorted(packages)],
+        "MOTIONLAB_ settings": sorted(settings),
+        "data at hand": data_at_hand(),
+    }
+    for folder in READS:
+        paths = sorted(files_below([ROOT / folder]))
+        read = lambda path: hashlib.sha256(path.read_bytes()).hexdigest()
+        found[folder] = [(str(path.relative_to(ROOT)), read(path)) for path in paths]
+    return {what: hashlib.sha256(repr(facts).encode()).hexdigest() for what, facts in found.items()}
 
 
 def files_below(folders: Iterable[Path]) -> Iterable[Path]:
@@ -121,19 +127,31 @@ def data_at_hand() -> list[tuple[str, int, int]]:
     return sorted((str(path), fact.st_size, fact.st_mtime_ns) for path, fact in facts)
 
 
-def fingerprint(chapter: Chapter, around: str) -> str:
-    """Of a page's code and all that it stands on; its words decide nothing."""
+def fingerprint(chapter: Chapter) -> str:
+    """Of a page's code; its words decide nothing."""
     page = read_page(chapter.path)
     code = [(c.source, c.metadata) for c in page.cells if c.cell_type == "code"]
-    facts = json.dumps([around, code, page.metadata.get("kernelspec")], sort_keys=True)
+    facts = json.dumps([code, page.metadata.get("kernelspec")], sort_keys=True)
     return hashlib.sha256(facts.encode()).hexdigest()
 
 
-def good(chapter: Chapter, around: str) -> bool:
-    """Was it executed without an error, on what there is now?"""
+def why(chapter: Chapter, around: dict[str, str]) -> str:
+    """Why it is to be executed; empty if it ran well on what there is now."""
     record = chapter.record
-    same = bool(record) and not record["error"] and record["of"] == fingerprint(chapter, around)
-    return same and chapter.executed() is not None
+    if not record:
+        return "was not executed yet"
+    if record["error"]:
+        return "failed last time"
+    if record["of"] != fingerprint(chapter) or chapter.executed() is None:
+        return "its code changed"
+    was = record["around"]
+    changed = [what for what in around if was.get(what) != around[what]]
+    return f"changed: {', '.join(changed)}" if changed or len(was) != len(around) else ""
+
+
+def good(chapter: Chapter, around: dict[str, str]) -> bool:
+    """Was it executed without an error, on what there is now?"""
+    return not why(chapter, around)
 
 
 # -- executing them -------------------------------------------------------------------------------
@@ -152,18 +170,18 @@ class Workers:
     def minutes(self) -> str:
         return f"{(time.monotonic() - self.begin) / 60:5.1f} min"
 
-    def execute(self, chapter: Chapter, around: str) -> None:
+    def execute(self, chapter: Chapter, around: dict[str, str]) -> None:
         """Execute a page; its folder is replaced when all of it is there."""
         if self.stopped:
             return
         chapter.store.mkdir(parents=True, exist_ok=True)
-        of, begun = fingerprint(chapter, around), time.time()
+        of, begun = fingerprint(chapter), time.time()
         with tempfile.TemporaryDirectory(
             dir=chapter.store, prefix=".", ignore_cleanup_errors=True
         ) as new:
             said = self._run(chapter, Path(new))
             record = _read(Path(new) / "record.json") or {"error": said, "cells": 0}
-            record |= {"format": FORMAT, "of": of, "begun": begun}
+            record |= {"format": FORMAT, "of": of, "around": around, "begun": begun}
             (Path(new) / "record.json").write_text(json.dumps(record), encoding="utf-8")
             if self.stopped:
                 return
@@ -200,7 +218,7 @@ class Workers:
 
 
 def execute(
-    chapters: Sequence[Chapter], around: str, jobs: int, say: Callable[[str], None]
+    chapters: Sequence[Chapter], around: dict[str, str], jobs: int, say: Callable[[str], None]
 ) -> None:
     """Execute pages, `jobs` at a time, those that took longest last time first; tells how it goes.
 
@@ -239,7 +257,8 @@ def _finish(future: Future, chapter: Chapter) -> None:
 
 def _tell_end(chapter: Chapter, left: int, workers: Workers) -> None:
     record = chapter.record
-    how = "FAILED" if record["error"] else "done"
+    error = record["error"]
+    how = f"FAILED at cell {error['cell']} of {error['of']}" if error else "done"
     took = f" in {record['seconds'] / 60:.1f} min" if "seconds" in record else ""
     workers.say(f"{workers.minutes}  {chapter.name}: {how}{took}; {left} left")
 
@@ -263,7 +282,7 @@ def told(chapter: Chapter) -> str:
     source = "".join(f"\n    {line}" for line in error["source"].splitlines())
     return (
         f"{chapter.shown}{where}{source}\n  {error['message']}\n"
-        f"  alone, with all it says: python book/execute.py {chapter.shown}"
+        f"  alone, with all it says: {_shown(Path(sys.executable))} book/execute.py {chapter.shown}"
     )
 
 

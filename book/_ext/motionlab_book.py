@@ -43,10 +43,17 @@ def copy_scripts(app: Sphinx, error) -> None:
         static = Path(app.outdir) / "_static"
         for old in static.glob("motionlab-weights-*.js"):
             old.unlink()
-        for script in EXECUTED.glob("*/scripts/*.js"):
-            shutil.copyfile(script, static / script.name)
+        for folder in executed(app.env):
+            for script in folder.glob("scripts/*.js"):
+                shutil.copyfile(script, static / script.name)
         (static / "motionlab-player.js").write_bytes(bundle_path().read_bytes())
         write_viewer(static)
+
+
+def executed(env) -> list[Path]:
+    """Folders of what was executed, of the pages that this book has."""
+    names = sorted(Path(page).name for page in env.found_docs)
+    return [EXECUTED / name for name in names if (EXECUTED / name / "record.json").is_file()]
 
 
 class BuildRecord(SphinxDirective):
@@ -54,11 +61,11 @@ class BuildRecord(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         rows = [("Page", "Cells", "Threads", "Seconds of processors", "By the clock", "Ended")]
-        for file in sorted(EXECUTED.glob("*/record.json")):
-            record = json.loads(file.read_text(encoding="utf-8"))
+        for folder in executed(self.env):
+            record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
             used = [f"{record.get(key, 0):.0f}" for key in ("processor_seconds", "seconds")]
             told = (str(record["cells"]), record.get("threads", ""), *used)
-            rows.append((file.parent.name, *told, "failed" if record["error"] else "well"))
+            rows.append((folder.name, *told, "failed" if record["error"] else "well"))
         return [table_of(rows)]
 
 

@@ -60,6 +60,11 @@ def judge(claim: dict, results: Path = ROOT / "results") -> Verdict:
 
 
 def main(wanted: Sequence[str]) -> None:
+    for name in wanted:
+        if not any(matches(claim["id"], name) for claim in claims()):
+            sys.exit(
+                f"There is no claim {name!r}; there are {', '.join(c['id'] for c in claims())}."
+            )
     for claim in claims():
         if wanted and not any(matches(claim["id"], name) for name in wanted):
             continue

@@ -135,7 +135,8 @@ class Skeleton:
             return self.roles[name]
         raise SkeletonError(
             f"This skeleton has no joint or role {name!r}. Joints: {', '.join(self.names)}. "
-            f"Roles: {', '.join(self.roles)}."
+            f"Roles: {', '.join(self.roles) or 'none'}. Which joint has one is said with "
+            f"read_bvh(path, roles={{{str(name)!r}: 'NAME'}})."
         )
 
     def __repr__(self) -> str:

@@ -31,13 +31,14 @@ print("four", 2 + 2)
 """
 
 # build.py, but of the pages that it is given
+HERE = {"library": "as it is"}
 BUILD_OF = """
 import sys
 sys.path.insert(0, {book!r})
 import build, chapters
 paths = list(map(chapters.Path, sys.argv[1:]))
 pages = [chapters.Chapter(path, path.parent / "executed") for path in paths]
-build.build = lambda again, jobs: chapters.execute(pages, "here", 2, print)
+build.build = lambda again, jobs: chapters.execute(pages, {{"library": "as it is"}}, 2, print)
 sys.argv = ["build.py"]
 build.main()
 """
@@ -65,12 +66,12 @@ def write(tmp_path, chapters):
 def keep(chapters):
     """Put down what would have been kept of a chapter that ran well, without running it."""
 
-    def as_if_run(chapter, around="here"):
+    def as_if_run(chapter, around=HERE):
         page = chapters.read_page(chapter.path)
         chapter.folder.mkdir(parents=True, exist_ok=True)
         nbformat.write(page, chapter.folder / "page.ipynb")
         record = {"format": chapters.FORMAT, "error": None, "cells": 1, "begun": time.time(),
-                  "of": chapters.fingerprint(chapter, around)}  # fmt: skip
+                  "of": chapters.fingerprint(chapter), "around": around}  # fmt: skip
         (chapter.folder / "record.json").write_text(json.dumps(record))
 
     return as_if_run
@@ -80,7 +81,7 @@ def keep(chapters):
 def run(chapters):
     """Execute chapters, two at a time; gives what was said."""
 
-    def execute(*some, around="here"):
+    def execute(*some, around=HERE):
         said = []
         chapters.execute(some, around, 2, said.append)
         return said
@@ -132,19 +133,33 @@ def test_pages_know_that_they_are_pages(write, run, monkeypatch, tmp_path):
 
 def test_what_did_not_change_is_not_executed_again(write, keep, chapters):
     one = write("one", "print(1)")
-    assert not chapters.good(one, "here")
+    assert not chapters.good(one, HERE)
     keep(one)
-    assert chapters.good(one, "here")
-    assert not chapters.good(one, "another library")
+    assert chapters.good(one, HERE)
+    assert not chapters.good(one, {**HERE, "library": "another"})
     page = nbformat.read(one.path, as_version=4)
     page.cells.insert(0, nbformat.v4.new_markdown_cell("Words alone change nothing."))
     nbformat.write(page, one.path)
-    assert chapters.good(one, "here")
+    assert chapters.good(one, HERE)
     page.cells[1].metadata["tags"] = ["hide-input"]  # it goes with what is kept
     nbformat.write(page, one.path)
-    assert not chapters.good(one, "here")
+    assert not chapters.good(one, HERE)
     write("one", "print(2)")
-    assert not chapters.good(one, "here") and one.executed() is None  # another page's outputs
+    assert not chapters.good(one, HERE) and one.executed() is None  # another page's outputs
+
+
+def test_it_is_said_why_a_chapter_is_executed_again(write, keep, chapters):
+    one = write("one", "print(1)")
+    assert chapters.why(one, HERE) == "was not executed yet"
+    keep(one)
+    assert chapters.why(one, HERE) == ""
+    assert chapters.why(one, {"library": "another"}) == "changed: library"
+    assert chapters.why(one, HERE | {"data at hand": "some"}) == "changed: data at hand"
+    write("one", "print(2)")
+    assert chapters.why(one, HERE) == "its code changed"
+    now = chapters.surroundings()
+    assert now == chapters.surroundings()
+    assert {"src/motionlab", "results", "experiments", "data at hand"} < {*now}
 
 
 def test_what_is_kept_is_not_trusted_if_damaged_or_of_another_version(write, keep, chapters):
@@ -154,13 +169,13 @@ def test_what_is_kept_is_not_trusted_if_damaged_or_of_another_version(write, kee
         whole = path.read_text()
         for content in ("", "{", "[1]", "{}", whole[: len(whole) // 2]):
             path.write_text(content)
-            assert not chapters.good(one, "here"), (path.name, content)
+            assert not chapters.good(one, HERE), (path.name, content)
         path.unlink()
-        assert not chapters.good(one, "here")
+        assert not chapters.good(one, HERE)
         path.write_text(whole)
-        assert chapters.good(one, "here")
+        assert chapters.good(one, HERE)
     path.write_text(whole.replace('"format": 1', '"format": 0'))
-    assert not chapters.good(one, "here")
+    assert not chapters.good(one, HERE)
 
 
 def test_an_error_names_chapter_cell_and_remedy_and_leaves_the_others(write, run, chapters):
@@ -169,11 +184,11 @@ def test_an_error_names_chapter_cell_and_remedy_and_leaves_the_others(write, run
     )
     fine = write("fine", "print('fine')")
     said = run(bad, fine)
-    assert chapters.good(fine, "here") and not chapters.good(bad, "here")
-    assert any("bad: FAILED" in line for line in said)
+    assert chapters.good(fine, HERE) and not chapters.good(bad, HERE)
+    assert any("bad: FAILED at cell 2 of 3" in line for line in said)
     told = chapters.told(bad)
     assert "bad.ipynb, cell 2 of 3:" in told and "ValueError: no feet" in told
-    assert "y = [" in told and f"python book/execute.py {bad.path}" in told
+    assert "y = [" in told and f"{sys.executable} book/execute.py {bad.path}" in told
     assert bad.executed().cells[1].outputs[0].ename == "ValueError"  # the page shows it
     assert not bad.executed().cells[2].outputs
 
@@ -204,13 +219,13 @@ def test_an_interrupted_build_keeps_what_is_done_and_ends_what_is_not(write, cha
         [sys.executable, "-c", BUILD_OF.format(book=str(chapters.BOOK)), str(done.path), str(slow.path)],
         stdout=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
-    wait_for(lambda: (tmp_path / "pid").exists() and chapters.good(done, "here"))
+    wait_for(lambda: (tmp_path / "pid").exists() and chapters.good(done, HERE))
     os.killpg(process.pid, signal.SIGTERM)  # build.py takes it for a Ctrl-C
     said, _ = process.communicate(timeout=60)
-    assert process.returncode == 130 and "kept" in said
+    assert process.returncode == 130 and "is kept" in said
     kernel = int((tmp_path / "pid").read_text())
     wait_for(lambda: not alive(kernel))
-    assert chapters.good(done, "here") and not slow.record
+    assert chapters.good(done, HERE) and not slow.record
     assert [path.name for path in (tmp_path / "executed").iterdir()] == ["done"]
 
 
@@ -242,12 +257,12 @@ def test_chapters_can_be_asked_for(build, write, keep):
     one, two = write("01_one", "print(1)"), write("02_two", "print(2)")
     keep(one)
     keep(two)
-    assert build.outdated([one, two], "here", None) == []
-    assert build.outdated([one, two], "here", []) == [one, two]
-    assert build.outdated([one, two], "here", ["02"]) == [two]
-    assert build.outdated([one, two], "there", ["02"]) == [one, two]
+    assert build.outdated([one, two], HERE, None) == []
+    assert build.outdated([one, two], HERE, []) == [one, two]
+    assert build.outdated([one, two], HERE, ["02"]) == [two]
+    assert build.outdated([one, two], {"library": "there"}, ["02"]) == [one, two]
     with pytest.raises(SystemExit, match="07.*01_one, 02_two"):
-        build.outdated([one, two], "here", ["07"])
+        build.outdated([one, two], HERE, ["07"])
 
 
 def test_a_full_disk_is_a_sentence(build, monkeypatch, write, run):
@@ -266,10 +281,10 @@ def test_a_full_disk_is_a_sentence(build, monkeypatch, write, run):
 def test_pages_know_all_that_they_are_made_of(build, write, keep):
     one = write("one", "print(1)")
     keep(one)
-    made = build.made_of([one], "here")
-    assert build.made_of([one], "here") == made != build.made_of([one], "there")
+    made = build.made_of([one], HERE)
+    assert build.made_of([one], HERE) == made != build.made_of([one], {"library": "there"})
     keep(one)
-    assert build.made_of([one], "here") != made  # executed anew
+    assert build.made_of([one], HERE) != made  # executed anew
 
 
 # -- the budget -----------------------------------------------------------------------------------

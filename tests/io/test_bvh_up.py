@@ -170,3 +170,26 @@ def test_of_joints_that_nobody_knows_nothing_is_said(tmp_path):
     torch.testing.assert_close(
         read.positions(), walk(0.2).positions()[:, : len(names)], rtol=0, atol=1e-5
     )
+
+
+def test_a_rest_pose_that_stands_already_stays_also_if_its_roles_had_to_be_said(tmp_path):
+    motion = walk()
+    turn = matrix("z")
+    carried = motion.rotations.clone()
+    carried[:, 0] = turn.T @ carried[:, 0]  # the root carries the quarter turn
+    motion = replace(
+        motion, root_positions=motion.root_positions @ turn, rotations=carried, contacts=None
+    )
+    names = tuple(f"bone{joint}" for joint in range(motion.skeleton.joints))
+    table = {role: names[joint] for role, joint in motion.skeleton.roles.items()}
+    write_bvh(motion, tmp_path / "known.bvh")
+    write_bvh(
+        replace(motion, skeleton=replace(motion.skeleton, names=names)), tmp_path / "said.bvh"
+    )
+    known = read_bvh(tmp_path / "known.bvh", up="z")
+    said = read_bvh(tmp_path / "said.bvh", up="z", roles=table)
+    assert torch.equal(said.skeleton.offsets, known.skeleton.offsets)
+    assert torch.allclose(known.skeleton.offsets[1:], motion.skeleton.offsets[1:], atol=1e-6)
+    assert said.skeleton.roles == known.skeleton.roles
+    turned = read_bvh(tmp_path / "said.bvh", up="z")  # nobody knows where its trunk is
+    assert (turned.positions() - known.positions()).abs().max() < 1e-4

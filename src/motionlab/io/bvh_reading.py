@@ -89,7 +89,7 @@ def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, D
     body = _Body(nodes, tree, where, metres)
     shifts = {joint: shift[skip:] * metres for joint, shift in shifts.items()}
     motion = body.motion(angles[skip:], shifts, how.rigid == "mean", float(rate), source)
-    motion = _with_roles(turn_up(motion, how.up), how, where)
+    motion = turn_up(_with_roles(motion, how, where), how.up)  # which asks where the trunk is
     doubts |= body.doubts
     doubts["units"] = doubt_units(motion.skeleton, how.units)
     doubts["up"] = doubt_up(motion) if how.up is None else None

@@ -54,13 +54,12 @@ def turn_up(motion: Motion, up: str | None) -> Motion:
         rotations = rotations @ turn.T
         rotations[:, 1:] = turn @ rotations[:, 1:]
         becomes = {"XYZ"[old]: "XYZ"[new] for new, old in enumerate(turn.abs().argmax(1).tolist())}
-        skeleton = Skeleton(
-            skeleton.names,
-            skeleton.parents,
-            skeleton.offsets @ turn.T,
-            skeleton.end_parents,
-            skeleton.end_offsets @ turn.T,
-            tuple("".join(becomes[axis] for axis in o) for o in skeleton.rotation_orders),
+        orders = ("".join(becomes[axis] for axis in order) for order in skeleton.rotation_orders)
+        skeleton = replace(
+            skeleton,
+            offsets=skeleton.offsets @ turn.T,
+            end_offsets=skeleton.end_offsets @ turn.T,
+            rotation_orders=tuple(orders),
         )
     return replace(
         motion,

@@ -1,4 +1,4 @@
-"""Motion brought to another body: whose joint is which, how rigs draw their axes, the motion itself."""
+"""Motion brought to another body: how two rigs draw their axes, and the motion itself."""
 
 from .retarget import retarget
 

@@ -105,7 +105,8 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
             raise RetargetError(
                 f"The {name} has no joint for {', '.join(missing)}; its joints are "
                 f"{', '.join(its.names)}. Understood: {found or 'none'}. Say the others where the "
-                f"skeleton is made or read, as read_bvh(path, roles={{{missing[0]!r}: 'NAME'}})."
+                f"skeleton is made or read, as read_bvh(path, roles={{{missing[0]!r}: 'NAME'}}), on the "
+                "command line with --roles; `motionlab info FILE` shows and explains the table."
             )
         for joint, child in _BONES:
             offset = its.below(joint, child)

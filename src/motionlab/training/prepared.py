@@ -194,7 +194,7 @@ def prepare(
         raise DataError(
             f"{source}: has {len(training) // 2} clips for training and {splits.count('val')} for "
             "validation; there must be some of both. Which is for what depends on their names: "
-            "about one in ten is for validation. Give more clips."
+            "about one in ten is for validation. Give more clips, three at the least."
         )
     rows, lengths = torch.cat(features), torch.tensor([len(clip) for clip in features])
     normalizer = Normalizer.fit(training)

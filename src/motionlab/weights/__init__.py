@@ -3,7 +3,7 @@
     model = motionlab.load("lstm-gmm")
     features = model.generate(300, model.starts[2], **model.sampling)
 
-No data are needed. `experiments/shipping/weights.py` makes the files.
+No data are needed. `experiments/shipping` makes the files.
 """
 
 from __future__ import annotations
