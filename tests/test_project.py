@@ -248,9 +248,11 @@ def test_functions_of_the_reference_are_where_it_says():
     names = re.findall(r"autofunction:: motionlab\.(\S+)", text)
     assert {"contacts.label", "solvers.lock_feet", "viewer.show", "viewer.plots.curves"} <= {*names}
     for name in names:
-        first, *rest = name.split(".")
-        found = importlib.import_module(f"motionlab.{first}") if rest else motionlab
-        for part in rest or [first]:
+        found, path = motionlab, "motionlab"
+        for part in name.split("."):
+            path += f".{part}"
+            if not hasattr(found, part):
+                importlib.import_module(path)
             found = getattr(found, part)
         assert callable(found), name
 
