@@ -53,7 +53,7 @@ class Client(NotebookClient):
     """nbclient's, but it never waits for longer than a second without looking.
 
     Where a cell shows an ipywidgets Output, nbclient sends on the socket on which it waits for the
-    end of the cell, and may then sleep through that end for good: about every second time on a busy
+    end of the cell, and may then sleep through that end for good, more often the busier the
     machine (nbclient issue 312). Whoever asks anew finds the message.
     """
 

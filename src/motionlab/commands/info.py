@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from ..errors import BvhError, MotionLabError
-from ..roles import ALL, SIDES, read
+from ..io.bvh_units import foot_to_head
+from ..roles import ALL, read
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -100,22 +101,10 @@ def _counts(motion: Motion) -> str:
 
 def _size(motion: Motion) -> str:
     """How large the body is: along its bones if that can be told, else as it is seen first."""
-    s = motion.skeleton
-    feet = [s.roles[f"{side}_foot"] for side in SIDES if f"{side}_foot" in s.roles]
-    if feet and "head" in s.roles:
-        apart = _above(s, s.role("head")) ^ _above(s, feet[0])
-        return f"{sum(float(s.offsets[joint].norm()) for joint in apart):.2f} m from foot to head"
+    if (height := foot_to_head(motion.skeleton)) is not None:
+        return f"{height:.2f} m from foot to head"
     heights = motion[:1].positions()[0, :, 1]
     return f"{float(heights.max() - heights.min()):.2f} m high in its first frame"
-
-
-def _above(skeleton: Skeleton, joint: int) -> set[int]:
-    """A joint and those it hangs on."""
-    found = set()
-    while joint >= 0:
-        found.add(joint)
-        joint = skeleton.parents[joint]
-    return found
 
 
 def _missing(skeleton: Skeleton) -> list[str]:

@@ -35,7 +35,7 @@ def is_positive(value) -> bool:
 
 def doubt_units(skeleton: Skeleton, units: str | float) -> str | None:
     """What to say if the body is not of the size of a person, read in these units."""
-    height = _height(skeleton)
+    height = foot_to_head(skeleton)
     if height is None or HEIGHTS[0] <= height <= HEIGHTS[1]:
         return None
     raw = height / in_metres(units)
@@ -52,8 +52,9 @@ def doubt_units(skeleton: Skeleton, units: str | float) -> str | None:
     return f"{said}, as no person does; pass another unit: {better}."
 
 
-def _height(skeleton: Skeleton) -> float | None:
-    """Metres along the bones from a foot to the head, by way of where both hang together."""
+def foot_to_head(skeleton: Skeleton) -> float | None:
+    """Metres along the bones from a foot to the head, by way of where both hang together; None if
+    it is not known which joints these are."""
     roles = skeleton.roles
     foot = roles.get("left_foot", roles.get("right_foot"))
     if foot is None or "head" not in roles:
