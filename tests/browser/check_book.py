@@ -5,7 +5,8 @@
 Each page is opened from disk and from a local server, on a desktop and on a phone. It fails if a
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
 if a formula stays TeX; if a player stands still, or does not follow its slider; if a scene stays
-empty or does not follow its own; if a network does not load and move, or too slowly. Exit status 1, and one line for each trouble. Needs Chromium on the
+empty or does not follow its own; if a network does not load and move, or too slowly. It waits as
+long as a busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
 PATH (or its path in CHROMIUM).
 """
 
@@ -119,25 +120,25 @@ class Visit:
             self.trouble(f"{name} did not start")
             return
         frame = functools.partial(slider.evaluate, "s => Number(s.value)")
-        last = slider.evaluate("s => Number(s.max)")
 
         self._play(player, True)
         before, first = frame(), self._picture(player)
-        self.page.wait_for_timeout(900)
-        if self._picture(player) == first or frame() == before:
+        if not self._until(lambda: frame() != before and self._picture(player) != first):
             self.trouble(f"{name} does not move")
 
         self._play(player, False)
-        pictures = []
-        for share in (0.2, 0.7):
-            target = round(share * last)
-            slider.fill(str(target))
-            self.page.wait_for_timeout(400)
-            if abs(frame() - target) > 1:
-                self.trouble(f"{name}: the slider does not scrub (at {frame()}, asked {target})")
-            pictures.append(self._picture(player))
-        if pictures[0] == pictures[1]:
+        self._scrub(slider, 0.2, name)
+        first = self._when_still(functools.partial(self._picture, player))
+        self._scrub(slider, 0.7, name)
+        if not self._until(lambda: self._picture(player) != first):
             self.trouble(f"{name} shows the same picture wherever its slider stands")
+
+    def _scrub(self, slider, share: float, name: str) -> None:
+        """Take the slider to a share of its way; the player must leave it there."""
+        target = round(share * slider.evaluate("s => Number(s.max)"))
+        slider.fill(str(target))
+        if not self._until(lambda: abs(slider.evaluate("s => Number(s.value)") - target) <= 1):
+            self.trouble(f"{name}: the slider does not scrub (asked for {target})")
 
     def check_scenes(self) -> None:
         for number in range(self.page.locator(SCENE).count()):
