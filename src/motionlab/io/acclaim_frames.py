@@ -109,7 +109,7 @@ class AcclaimFrames:
                         number, f"{name!r} is there twice in a frame", "remove one of the two"
                     )
             if not its:
-                silent += [name] if self.dof[name] else []
+                silent += [name] if self.skeleton.bones[name].dof else []
             elif len(its) == last and where[-1] < last:
                 what = f"the last frame, {self._starts[-1][0]}, has no row for {name!r}"
                 self.fail(line, what, "the file is cut off: copy it again, or remove the frame")

@@ -116,8 +116,8 @@ class AcclaimSkeleton:
     def _units(self, number: int, key: str, words: list[str]) -> None:
         if key == "length":
             self.length = self._numbers(number, key, words, 1)[0]
-            if self.length <= 0:
-                self.fail(number, f"a unit of length {words[0]} is none", "write 'length 1.0'")
+            if not 1e-6 <= self.length <= 1e6:
+                self.fail(number, f"{words[0]} is no unit of length", "write 'length 1.0'")
         elif key == "angle":
             word = "".join(words).lower()
             if word not in ("deg", "degree", "degrees", "rad", "radian", "radians"):

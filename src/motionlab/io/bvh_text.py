@@ -67,9 +67,12 @@ def decode(data: bytes, where, kind: str = "BVH", error: type[MotionFileError] =
 def split(text: str, where) -> tuple[list[str], int]:
     """Header lines up to the first row of numbers, and the offset of that."""
     if not _START.match(text):
+        remedy = (
+            "read it with read_amc" if str(where).lower().endswith(".amc") else "export it as BVH"
+        )
         raise BvhError(
             f"{where}, line 1: a BVH file starts with HIERARCHY, this one with "
-            f"{text.lstrip()[:20]!r}; export it as BVH."
+            f"{text.lstrip()[:20]!r}; {remedy}."
         )
     motion = _MOTION.search(text)
     if motion is None:

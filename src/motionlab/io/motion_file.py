@@ -25,5 +25,7 @@ def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tupl
     ------
     MotionFileError : the file can't be read; the message names file and remedy.
     """
-    known = isinstance(path, str | os.PathLike) and Path(path).suffix.lower()
-    return _READERS.get(known, bvh_reading.read)(path, how, source)
+    ending = Path(path).suffix.lower() if isinstance(path, str | os.PathLike) else ""
+    if ending == ".asf":  # which is half a motion, as its reader says
+        return acclaim.read(path, how, source)
+    return _READERS.get(ending, bvh_reading.read)(path, how, source)
