@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from motionlab import read_amc, read_bvh, write_bvh
 from motionlab.__main__ import main
 from motionlab.datasets import from_folder, gaits
-from motionlab.errors import AmcError
+from motionlab.errors import AmcError, DataError
 from motionlab.io.acclaim import parse_amc
 from motionlab.io.bvh import parse_bvh
 
@@ -110,10 +110,11 @@ def test_bones_are_where_the_definition_puts_them(bones, order, unit, data):
 
 
 def test_real_clips_are_as_others_have_converted_them(recorded_clips):
-    """One clip of each subject, against BVH files of theirs; all joints in the same order."""
+    """A short clip of each subject, against BVH files of theirs; joints in the same order."""
     amc = zipfile.ZipFile(recorded_clips / "cmu-amc.zip")
     bvh = zipfile.ZipFile(recorded_clips / "converted" / "cmu-amc.zip")
-    clips = {name.partition("_")[0]: name for name in amc.namelist() if name.endswith(".amc")}
+    sizes = {file.filename: file.file_size for file in amc.infolist() if "_" in file.filename}
+    clips = {name.partition("_")[0]: name for name in sorted(sizes, key=sizes.get, reverse=True)}
     assert len(clips) == 8
     for subject, name in clips.items():
         motion = parse_amc(amc.read(name), amc.read(f"{subject}.asf"), name, fps=120)
@@ -197,6 +198,24 @@ def test_radians_in_the_skeleton_and_degrees_in_the_motion():
     same(parse(AMC, tiny.asf(turned, angle="rad")), parse(AMC))
 
 
+def test_angles_that_are_not_said_are_degrees():
+    asf = tiny.asf().replace("  angle deg\n", "")
+    with pytest.warns(UserWarning, match=r"its \.asf\) does not say in :units what its angles are"):
+        same(parse(AMC, asf), parse(AMC))
+
+
+def test_axes_in_another_order_and_long_directions_are_told():
+    """Both can be meant otherwise; with angles about one axis, and of length 1, they can't."""
+    turned = [replace(bone, axes="ZYX") for bone in tiny.PERSON]
+    with pytest.warns(
+        UserWarning, match=r"line \d+: the axes of 'lfoot' are turned in the order ZYX"
+    ):
+        parse(AMC, tiny.asf(turned))
+    long = [replace(b, direction=(0, 2, 0)) if b.name == "head" else b for b in tiny.PERSON]
+    with pytest.warns(UserWarning, match="a direction is 2 long, not 1; bones are as long as"):
+        same(parse(AMC, tiny.asf(long)), parse(AMC))
+
+
 def test_the_roots_first_pose_moves_the_whole_motion():
     asf = tiny.asf(position="1 2 3", orientation="0 90 0")
     with pytest.warns(UserWarning, match=r"line \d+: the root is turned before all motion"):
@@ -217,7 +236,8 @@ def test_units_up_and_roles_can_be_said():
     torch.testing.assert_close(
         parse(AMC, tiny.asf(length=None), units=UNIT).positions(), plain.positions()
     )
-    assert parse(AMC, roles={"spine": "upperback"}).skeleton.roles["spine"] == 12 - 10
+    named = parse(AMC, roles={"spine": "upperback"}).skeleton
+    assert named.role("spine") == named.index("upperback") != plain.skeleton.role("spine")
     lying = parse(AMC, up="-z")
     torch.testing.assert_close(lying.positions()[..., 1], -plain.positions()[..., 2])
 
@@ -320,6 +340,10 @@ def test_folders_hold_both_kinds(tmp_path, capsys):
         clips = from_folder(tmp_path)
     assert [clip.name for clip in clips] == ["05_01", "05_02", "walk"]
     same(clips[1], parse(AMC))
+    with pytest.raises(DataError, match=r"'05_01' is there twice, as 05_01\.amc and 05_01\.bvh"):
+        write_bvh(clips[0], tmp_path / "05_01.bvh")
+        from_folder(tmp_path)
+    (tmp_path / "05_01.bvh").unlink()
     assert main(["info", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(":")[0] for line in lines] == ["05_01.amc", "05_02.AMC", "walk.bvh"]

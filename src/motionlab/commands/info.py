@@ -145,7 +145,7 @@ def _table(skeleton: Skeleton) -> list[str]:
     return [
         *lines,
         '# To mend this, keep it as my_rig.toml with the lines changed (a role that no joint has is "");',
-        "# --roles my_rig.toml, or read_bvh(FILE, roles=motionlab.roles.read('my_rig.toml')), reads it.",
+        "# --roles my_rig.toml, or in Python roles=motionlab.roles.read('my_rig.toml'), reads it.",
     ]
 
 

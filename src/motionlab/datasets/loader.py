@@ -281,6 +281,13 @@ def _find(
             f"{folder}: no file {sought}; put motion files there, or give another pattern."
         )
     names = [file.relative_to(folder).with_suffix("").as_posix() for file in found]
+    first: dict[str, Path] = {}
+    for file, name in zip(found, names, strict=True):
+        if (other := first.setdefault(name, file)) is not file:
+            raise DataError(
+                f"{folder}: {name!r} is there twice, as {other.name} and {file.name}; keep one of "
+                f"them, or give a pattern such as '**/*{other.suffix}'."
+            )
     splits = assign([("", name, "", "") for name in names])
     rows = zip(found, names, splits, strict=True)
     return folder, [row for row in rows if split in (None, row[2])]

@@ -123,8 +123,8 @@ class AcclaimFrames:
             self.doubts["silent"] = f"no frame has a row for {', '.join(silent)}; they do not turn."
         if holes:
             self.doubts["holes"] = (
-                f"some frames have no row for {', '.join(holes)[:200]}; there these bones stay as "
-                "they were in the frame before, as in no motion of a person."
+                f"some frames have no row for {', '.join(holes)[:200]}; there these bones keep the "
+                "angles of the frame before."
             )
 
     def _rate(self) -> None:

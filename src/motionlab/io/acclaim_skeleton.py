@@ -60,7 +60,7 @@ class AcclaimSkeleton:
     bones : by their names in lower case, the root first, parents before children.
     parents : of each bone the index of its parent, -1 of the root.
     length : units in an inch; the file's lengths are inches divided by it.
-    radians : whether its angles are radians.
+    radians : whether its angles are radians; what does not say so has degrees.
     position : (3,), of the root before all motion, in the file's unit.
     doubts : what is said in a way that can be meant otherwise.
     """
@@ -68,7 +68,7 @@ class AcclaimSkeleton:
     def __init__(self, text: str, where) -> None:
         self.where = where
         self.length = 1.0
-        self.radians = False
+        self._angle = ""
         self.position = [0.0, 0.0, 0.0]
         self.doubts: dict[str, str] = {}
         self._root = Bone(ROOT, direction=[0.0, 0.0, 0.0], length=0.0)
@@ -81,6 +81,10 @@ class AcclaimSkeleton:
 
     def fail(self, number: int, what: str, remedy: str) -> NoReturn:
         raise AmcError(f"{self.where}, line {number}: {what}; {remedy}.")
+
+    @property
+    def radians(self) -> bool:
+        return self._angle.startswith("rad")
 
     def turns(self) -> np.ndarray:
         """How the axes of each bone lie in the world, (bones, 3, 3); of the root its first pose."""
@@ -106,6 +110,10 @@ class AcclaimSkeleton:
             if words and section in sections:
                 sections[section](number, words[0].lower(), words[1:])
         self._end_bone(number)
+        if not self._angle and any(any(bone.axis) for bone in self._bones.values()):
+            self.doubts["angle"] = (
+                f"{self.where} does not say in :units what its angles are; they are taken as degrees."
+            )
         for section in (":bonedata", ":hierarchy"):
             if section not in seen:
                 what = f"there is no {section} section before the file ends"
@@ -122,7 +130,7 @@ class AcclaimSkeleton:
             word = "".join(words).lower()
             if word not in ("deg", "degree", "degrees", "rad", "radian", "radians"):
                 self.fail(number, f"{word[:20]!r} is no unit of angles", "write 'deg' or 'rad'")
-            self.radians = word.startswith("rad")
+            self._angle = word
 
     def _of_root(self, number: int, key: str, words: list[str]) -> None:
         if key == "order":
