@@ -76,7 +76,7 @@ def expected(bones, frame, order, unit) -> dict[str, np.ndarray]:
     for bone in bones:
         c = turned(bone.axes, dict(zip("xyz", bone.axis, strict=True)), unit)
         values = {k[1]: v for k, v in zip(bone.dof, frame.get(bone.name, ()), strict=True)}
-        m = turned("".join(kind[1] for kind in bone.dof), values, unit)
+        m = turned(bone.axes, values, unit)
         turn[bone.name] = turn[bone.parent] * c * m * c.inv()
         along = np.array(bone.direction) * bone.length
         found[bone.name] = found[bone.parent] + turn[bone.name].apply(along)
@@ -204,13 +204,28 @@ def test_angles_that_are_not_said_are_degrees():
         same(parse(AMC, asf), parse(AMC))
 
 
-def test_axes_in_another_order_and_long_directions_are_told():
-    """Both can be meant otherwise; with angles about one axis, and of length 1, they can't."""
-    turned = [replace(bone, axes="ZYX") for bone in tiny.PERSON]
-    with pytest.warns(
-        UserWarning, match=r"line \d+: the axes of 'lfoot' are turned in the order ZYX"
-    ):
+def test_angles_and_axes_in_other_orders_and_long_directions_are_told():
+    """All can be meant otherwise."""
+    turned = [replace(b, axes="ZYX") if b.name == "lwrist" else b for b in tiny.PERSON]
+    with pytest.warns(UserWarning, match=r"line \d+: the axes of 'lwrist' are turned in the order"):
         parse(AMC, tiny.asf(turned))
+    swapped = [replace(b, dof=("rz", "rx")) if b.name == "lfoot" else b for b in tiny.PERSON]
+    frames = tiny.sway(4)
+    for frame in frames:
+        frame["lfoot"].reverse()
+    with pytest.warns(
+        UserWarning, match=r"line \d+: 'lfoot' lists its angles in the order ZX and its "
+    ):
+        same(parse(tiny.amc(frames), tiny.asf(swapped)), parse(AMC))
+    for frame in frames:
+        frame["lfoot"].reverse()
+        frame["root"][3:] = [20.0, 0.0, 10.0]
+    with pytest.warns(
+        UserWarning, match="'root' lists its angles in the order ZYX .* of the angles"
+    ):
+        motion = parse(tiny.amc(frames), tiny.asf(order="TX TY TZ RZ RY RX"))
+    turn = Rotation.from_euler("zx", [20, 10], degrees=True).as_matrix()
+    np.testing.assert_allclose(motion.rotations[0, 0], turn, atol=1e-6)
     long = [replace(b, direction=(0, 2, 0)) if b.name == "head" else b for b in tiny.PERSON]
     with pytest.warns(UserWarning, match="a direction is 2 long, not 1; bones are as long as"):
         same(parse(AMC, tiny.asf(long)), parse(AMC))

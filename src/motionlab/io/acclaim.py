@@ -60,8 +60,9 @@ def read_amc(
         refuses it if it is more than 1 mm.
     tpose_first, drop_zeros, source, roles : as for `read_bvh`.
 
-    A bone's angles turn it about its own axes: with C of its ``axis`` and M of its ``dof``, both
-    about fixed axes in the order listed, its rotation against its parent is C M C⁻¹.
+    A bone's angles turn it about its own axes: with C of its ``axis`` and M of the motion, both
+    about fixed axes in the order that ``axis`` says, its rotation against its parent is C M C⁻¹.
+    The root's angles are about the world's axes, in the order that its ``order`` says.
 
     Returns
     -------
@@ -191,8 +192,8 @@ def _angles(skeleton: AcclaimSkeleton, frames: AcclaimFrames) -> tuple[np.ndarra
     """
     angles = np.zeros((frames.frames, len(skeleton.bones), 3))
     orders = []
-    for joint, name in enumerate(skeleton.bones):
-        turning = [kind for kind in frames.dof[name][::-1] if kind[0] == "r"]
+    for joint, (name, bone) in enumerate(skeleton.bones.items()):
+        turning = bone.applied(frames.dof[name])[::-1]
         for place, kind in enumerate(turning):
             if name in frames.values:
                 column = frames.dof[name].index(kind)

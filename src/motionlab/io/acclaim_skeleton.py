@@ -2,8 +2,8 @@
 
 After the format's definition, version 1.10 (M. Schafer, Acclaim, 1994), and Vicon's remarks on it.
 A bone begins where its parent ends and goes on along `direction` for `length`. Its angles turn it
-about axes of its own, which `axis` turns against the world; `dof` lists the angles that the motion
-has, in the order in which its rows list them and in which they are applied, about fixed axes.
+about axes of its own, which `axis` turns against the world, and in whose order they are applied;
+`dof` lists those that the motion has, as its rows list them. Of the root, `order` says both.
 """
 
 from __future__ import annotations
@@ -50,6 +50,13 @@ class Bone:
         """From its beginning to its end, (3,), in the file's unit."""
         norm = np.linalg.norm(self.direction)
         return np.array(self.direction) * (self.length / norm if norm else 0.0)
+
+    def applied(self, dof: list[str]) -> list[str]:
+        """The angles among degrees of freedom, first that which is applied first about fixed axes."""
+        listed = [kind for kind in dof if kind[0] == "r"]
+        if self.name == ROOT:
+            return listed
+        return sorted(listed, key=lambda kind: self.axes.index(kind[1]))
 
 
 class AcclaimSkeleton:
@@ -114,6 +121,8 @@ class AcclaimSkeleton:
             self.doubts["angle"] = (
                 f"{self.where} does not say in :units what its angles are; they are taken as degrees."
             )
+        for bone in self._bones.values():
+            self._doubt_order(bone)
         for section in (":bonedata", ":hierarchy"):
             if section not in seen:
                 what = f"there is no {section} section before the file ends"
@@ -134,7 +143,7 @@ class AcclaimSkeleton:
 
     def _of_root(self, number: int, key: str, words: list[str]) -> None:
         if key == "order":
-            self._root.dof = self._dof(number, words)
+            self._root.dof, self._root.line = self._dof(number, words), number
             if "l" in self._root.dof:
                 self.fail(number, "the root has no length", "remove L from its order")
         elif key == "axis":
@@ -219,6 +228,18 @@ class AcclaimSkeleton:
             what = f"bone {bone.name[:80]!r} is there twice (first in line {other.line})"
             self.fail(bone.line, what, "rename one of them")
         self._bones[bone.name.lower()] = bone
+
+    def _doubt_order(self, bone: Bone) -> None:
+        """Say so if the angles of a bone are listed in another order than its axes: the format's
+        definition has examples of both, and programs apply them in the one or the other."""
+        listed = [kind[1] for kind in bone.dof if kind[0] == "r"]
+        if listed != sorted(listed, key=bone.axes.index):
+            self.doubts.setdefault(
+                "order",
+                f"{self.where}, line {bone.line}: {bone.name!r} lists its angles in the order "
+                f"{''.join(listed).upper()} and its axes as {bone.axes.upper()}; they are applied in "
+                f"the order of the {'angles' if bone.name == ROOT else 'axes'}.",
+            )
 
     def _axis(self, number: int, bone: Bone, words: list[str]) -> None:
         if words and _AXES.fullmatch(words[-1]):
