@@ -10,7 +10,7 @@ from .skeleton import Skeleton
 from .version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from .io import read_bvh, write_bvh, write_gltf
+    from .io import read_amc, read_bvh, write_bvh, write_gltf
     from .viewer import show
     from .weights import load
 
@@ -27,6 +27,7 @@ __all__ = [
     "io",
     "load",
     "metrics",
+    "read_amc",
     "read_bvh",
     "show",
     "viewer",
@@ -37,6 +38,7 @@ __all__ = [
 _MODULES = ("contacts", "datasets", "encodings", "ik", "io", "metrics", "viewer")
 _FUNCTIONS = {
     "load": ".weights",
+    "read_amc": ".io",
     "read_bvh": ".io",
     "show": ".viewer",
     "write_bvh": ".io",

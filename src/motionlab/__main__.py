@@ -154,11 +154,11 @@ class Prepare:
     """Make motion ready for training: one file of features, splits and normaliser."""
 
     source: Positional[Annotated[str, arg(metavar="NAME|FOLDER")]]
-    """Data set, as `data list` names it, or a folder of BVH files."""
+    """Data set, as `data list` names it, or a folder of .bvh and .amc files."""
     permissive: bool = False
     """Leave out clips whose licence forbids commercial use."""
     units: str | None = None
-    """Of a folder's files: m, dm, cm, mm, in, ft, or metres per unit; cm if left out."""
+    """Of a folder's files: m, dm, cm, mm, in, ft, or metres per unit; cm for BVH if left out."""
     up: str | None = None
     """Axis that points up in a folder's files: y, z, x, or with a minus, as --up=-z; y if left out,
     with a warning of bodies that are never upright."""

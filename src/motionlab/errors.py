@@ -5,11 +5,19 @@ class MotionLabError(Exception):
     """Base of every error that motionlab raises on purpose."""
 
 
-class BvhError(MotionLabError):
+class MotionFileError(MotionLabError):
+    """A file of motion that can't be read or written; the message names file and remedy."""
+
+
+class BvhError(MotionFileError):
     """A BVH file that can't be read or written; the message names file, line and remedy."""
 
 
-class GltfError(MotionLabError):
+class AmcError(MotionFileError):
+    """An Acclaim .amc or .asf file that can't be read; the message names file, line and remedy."""
+
+
+class GltfError(MotionFileError):
     """A glTF file that can't be written."""
 
 

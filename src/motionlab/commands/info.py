@@ -1,10 +1,9 @@
-"""`motionlab info`: what is in a BVH file, and which joint was understood as what."""
+"""`motionlab info`: what is in a motion file, and which joint was understood as what."""
 
 from __future__ import annotations
 
 import json
 import os
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from ..errors import BvhError, MotionLabError
+from ..errors import MotionFileError, MotionLabError
+from ..io.bvh_reading import Reading
 from ..io.bvh_units import foot_to_head
+from ..io.motion_file import SUFFIXES, is_motion, read_motion
 from ..roles import ALL, read
 
 if TYPE_CHECKING:
@@ -23,14 +24,14 @@ if TYPE_CHECKING:
 
 @dataclass
 class Info:
-    """What is in a BVH file, and which joint is understood as what; a line a file for a folder."""
+    """What is in a motion file, BVH or Acclaim, and which joint is understood as what; a line a file for a folder."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
-    """BVH file, or a folder of them."""
+    """A .bvh or .amc file, or a folder of them."""
     roles: Annotated[Path | None, arg(metavar="TABLE")] = None
     """TOML or JSON file that says which joint is which, as this command prints it."""
-    units: float | str = "cm"
-    """The file's unit: m, dm, cm, mm, in, ft, or metres per unit."""
+    units: float | str | None = None
+    """The file's unit: m, dm, cm, mm, in, ft, or metres per unit; if not said, cm for BVH."""
     up: str | None = None
     """The file's axis that points up: y, z, x, or with a minus, as --up=-z."""
     root: str | None = None
@@ -45,12 +46,12 @@ class Info:
 
 
 def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None, **reading) -> str:
-    """What is in a BVH file: sizes, and each joint with its role.
+    """What is in a motion file: sizes, and each joint with its role.
 
     Parameters
     ----------
     path : the file, or a folder, of which each file gets one line, faults included.
-    roles, reading : as `motionlab.read_bvh` takes them.
+    roles, reading : as `motionlab.datasets.from_folder` takes them.
 
     Returns
     -------
@@ -59,26 +60,24 @@ def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None,
 
     Raises
     ------
-    BvhError : the file can't be read, `roles` do not fit it, or a folder has no BVH file.
+    MotionFileError : the file can't be read, `roles` do not fit it, or a folder has no motion file.
     """
     path = Path(path)
     if not path.is_dir():
         motion, doubts = _read(path, roles, reading)
         return "\n".join([*_sizes(motion, doubts), "#", *_table(motion.skeleton)])
-    files = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".bvh")
+    files = sorted(file for file in path.rglob("*") if is_motion(file))
     if not files:
-        raise BvhError(f"{path}: holds no .bvh file; name a BVH file or a folder of them.")
+        raise MotionFileError(
+            f"{path}: holds no {' or '.join(SUFFIXES)} file; name one, or a folder of them."
+        )
     return "\n".join(_line(file, file.relative_to(path), roles, reading) for file in files)
 
 
 def _read(path: Path, roles: Mapping[str, str] | None, reading: dict) -> tuple[Motion, list[str]]:
     """A motion, and what reading it warned of."""
-    from ..io import read_bvh
-
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        motion = read_bvh(path, roles=roles, **reading)
-    return motion, [str(each.message) for each in told]
+    motion, doubts = read_motion(path, Reading(roles=roles, **reading))
+    return motion, list(doubts.values())
 
 
 def _line(file: Path, name: Path, roles: Mapping[str, str] | None, reading: dict) -> str:
@@ -146,7 +145,7 @@ def _table(skeleton: Skeleton) -> list[str]:
     return [
         *lines,
         '# To mend this, keep it as my_rig.toml with the lines changed (a role that no joint has is "");',
-        "# --roles my_rig.toml, or read_bvh(FILE, roles=motionlab.roles.read('my_rig.toml')), reads it.",
+        "# --roles my_rig.toml, or in Python roles=motionlab.roles.read('my_rig.toml'), reads it.",
     ]
 
 

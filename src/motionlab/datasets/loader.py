@@ -14,9 +14,10 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from ..errors import BvhError, DataError, MotionLabError
+from ..errors import DataError, MotionFileError, MotionLabError
 from ..io.bvh import parse_bvh
-from ..io.bvh_reading import Reading, read
+from ..io.bvh_reading import Reading
+from ..io.motion_file import SUFFIXES, is_motion, read_motion
 from ..motion import Motion
 from . import cache, files, locomotion
 from .registry import (
@@ -32,7 +33,6 @@ from .registry import (
 )
 from .splits import assign
 
-BVH_FILES = "**/*.[bB][vV][hH]"
 _lock = threading.Lock()
 _threads_before: list[int] = []  # of loads under way; what to go back to is what the first found
 
@@ -171,32 +171,33 @@ def _gaits(split: str | None, clips: Sequence[str] | None) -> list[Motion]:
 def from_folder(
     path: str | os.PathLike,
     *,
-    units: str | float = "cm",
+    units: str | float | None = None,
     up: str | None = None,
     fps: float | None = None,
     root: str | None = None,
     rigid: str | None = None,
     roles: Mapping[str, str] | None = None,
-    pattern: str = BVH_FILES,
+    pattern: str | None = None,
     tpose_first: bool = False,
     drop_zeros: bool = False,
     split: str | None = None,
     skip_bad: bool = False,
 ) -> list[Motion]:
-    """All BVH files of a folder and its subfolders: a reader's own clips.
+    """All motion files of a folder and its subfolders, BVH and Acclaim: a reader's own clips.
 
     Parameters
     ----------
     path : the folder.
-    units, up, fps, root, rigid, roles, tpose_first, drop_zeros : as for `motionlab.read_bvh`, for
-        all files alike. What is doubtful about files, such as their units, is said once, with their number.
-    pattern : which files, as for `pathlib.Path.glob`.
+    units, up, fps, root, rigid, roles, tpose_first, drop_zeros : as for `motionlab.read_bvh` and
+        `motionlab.read_amc`, for all files alike; units None is centimetres for BVH, for Acclaim
+        what its skeleton says. What is doubtful about files, such as their units, is said once, with their number.
+    pattern : which files, as for `pathlib.Path.glob`; None takes all that end in .bvh or .amc.
     split : only the files of this split; which are in it depends on the files' names alone.
     skip_bad : leave out files that can't be read, with a warning, instead of raising.
 
     Returns
     -------
-    list of Motion, by path, named by it without .bvh; `motion.source` is the folder's name.
+    list of Motion, by path, named by it without its ending; `motion.source` is the folder's name.
 
     Raises
     ------
@@ -216,7 +217,7 @@ def read_folder(
     path: str | os.PathLike,
     *,
     then: Callable[[Motion], Motion] = lambda motion: motion,
-    pattern: str = BVH_FILES,
+    pattern: str | None = None,
     split: str | None = None,
     skip_bad: bool = False,
     **reading,
@@ -232,11 +233,11 @@ def read_folder(
     with _progress(f"reading {folder.name}", len(chosen)) as bar:
         for file, name, its in chosen:
             try:
-                motion, doubts = read(file, how, folder.resolve().name)
+                motion, doubts = read_motion(file, how, folder.resolve().name)
                 for about, said in doubts.items():
                     doubtful.setdefault(about, []).append(f"{file}: {said}")
                 motions.append((its, then(replace(motion, name=name))))
-            except BvhError as error:
+            except MotionFileError as error:
                 faults.append(str(error))
             except MotionLabError as error:
                 faults.append(f"{file}: {error}")
@@ -254,25 +255,39 @@ def read_folder(
 
 
 def _find(
-    path: str | os.PathLike, pattern: str, split: str | None
+    path: str | os.PathLike, pattern: str | None, split: str | None
 ) -> tuple[Path, list[tuple[Path, str, str]]]:
     """The folder, and of each of its files that is of the split: path, name of the clip, split."""
     if not isinstance(path, str | os.PathLike):
-        raise DataError(f"from_folder: {path!r} is not a path; give the folder of the BVH files.")
+        raise DataError(
+            f"from_folder: {path!r} is not a path; give the folder of the motion files."
+        )
     folder = Path(path).expanduser()
     if not folder.is_dir():
-        raise DataError(f"{folder}: is not a folder; give the folder that holds the BVH files.")
+        raise DataError(f"{folder}: is not a folder; give the folder that holds the motion files.")
     try:
-        found = sorted(file for file in folder.glob(pattern) if file.is_file())
+        found = sorted(
+            file
+            for file in folder.glob(pattern or "**/*")
+            if (pattern or is_motion(file)) and file.is_file()
+        )
     except (ValueError, NotImplementedError) as error:
         raise DataError(
             f"{folder}: {pattern!r} is no pattern below the folder; write one like '**/*.bvh'."
         ) from error
     if not found:
+        sought = f"matches {pattern!r}" if pattern else f"ends in {' or '.join(SUFFIXES)}"
         raise DataError(
-            f"{folder}: no file matches {pattern!r}; put BVH files there, or give another pattern."
+            f"{folder}: no file {sought}; put motion files there, or give another pattern."
         )
     names = [file.relative_to(folder).with_suffix("").as_posix() for file in found]
+    first: dict[str, Path] = {}
+    for file, name in zip(found, names, strict=True):
+        if (other := first.setdefault(name, file)) is not file:
+            raise DataError(
+                f"{folder}: {name!r} is there twice, as {other.name} and {file.name}; keep one of "
+                f"them, or give a pattern such as '**/*{other.suffix}'."
+            )
     splits = assign([("", name, "", "") for name in names])
     rows = zip(found, names, splits, strict=True)
     return folder, [row for row in rows if split in (None, row[2])]

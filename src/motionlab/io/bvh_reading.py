@@ -20,7 +20,7 @@ from ..motion import Motion
 from ..skeleton import Skeleton
 from .bvh_header import Layout, Tree
 from .bvh_rate import rate_of
-from .bvh_text import decode, last_line, parse_rows, split
+from .bvh_text import decode, last_line, opened, parse_rows, split
 from .bvh_units import doubt_units, in_metres, is_positive
 from .bvh_up import check_up, doubt_up, turn_up
 from .euler import from_euler
@@ -33,9 +33,12 @@ Doubts = dict[str, str]
 
 @dataclass(frozen=True)
 class Reading:
-    """How files are read: the arguments of `read_bvh`, checked before any file is opened."""
+    """How files are read: the arguments of `read_bvh`, checked before any file is opened.
 
-    units: str | float = "cm"
+    Of a BVH file units None is "cm"; an Acclaim skeleton says its own.
+    """
+
+    units: str | float | None = None
     fps: float | None = None
     tpose_first: bool = False
     drop_zeros: bool = False
@@ -45,7 +48,8 @@ class Reading:
     roles: Mapping[str, str] | None = None
 
     def __post_init__(self) -> None:
-        in_metres(self.units)
+        if self.units is not None:
+            in_metres(self.units)
         check_up(self.up)
         if self.fps is not None and not is_positive(self.fps):
             raise BvhError(f"fps={self.fps!r} is not a positive number of frames per second.")
@@ -58,15 +62,7 @@ class Reading:
 
 def read(path: str | os.PathLike, how: Reading, source: str = "") -> tuple[Motion, Doubts]:
     """The motion in a file, and what to warn of."""
-    if not isinstance(path, str | os.PathLike):
-        raise BvhError(f"read_bvh: {path!r} is not a path; give the file to read.")
-    path = Path(path)
-    try:
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        reason = getattr(error, "strerror", None) or error
-        raise BvhError(f"{path}: can't be opened ({reason}); check path and rights.") from error
-    return parse(data, path, how, source)
+    return parse(opened(path), Path(path), how, source)
 
 
 def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, Doubts]:
@@ -84,14 +80,15 @@ def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, D
     doubts["frames"] = _doubt_count(layout, len(values), text)
     doubts["scale"] = tree.doubt_scale(values)
     angles, shifts = tree.sort(values)
-    skip = _frames_to_skip(angles, how, where)
-    metres = in_metres(how.units)
+    skip = frames_to_skip(angles, how, where)
+    units = "cm" if how.units is None else how.units
+    metres = in_metres(units)
     body = _Body(nodes, tree, where, metres)
     shifts = {joint: shift[skip:] * metres for joint, shift in shifts.items()}
     motion = body.motion(angles[skip:], shifts, how.rigid == "mean", float(rate), source)
     motion = turn_up(_with_roles(motion, how, where), how.up)  # which asks where the trunk is
     doubts |= body.doubts
-    doubts["units"] = doubt_units(motion.skeleton, how.units)
+    doubts["units"] = doubt_units(motion.skeleton, units)
     doubts["up"] = doubt_up(motion) if how.up is None else None
     return motion, {about: said for about, said in doubts.items() if said}
 
@@ -118,7 +115,8 @@ def _doubt_count(layout: Layout, rows: int, text: str) -> str | None:
     return f"{said}, all of which are read; if it was cut off or edited, copy it again."
 
 
-def _frames_to_skip(angles: np.ndarray, how: Reading, where) -> int:
+def frames_to_skip(angles: np.ndarray, how: Reading, where) -> int:
+    """How many frames to leave out at the beginning. angles : (frames, joints, 3)."""
     skip = int(how.tpose_first)
     if how.drop_zeros:
         moving = np.flatnonzero(angles[skip:].any((1, 2)))

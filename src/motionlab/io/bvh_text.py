@@ -1,6 +1,7 @@
 """The text of a BVH file: decoding, where its parts are, the rows of numbers.
 
-What can be wrong with the text is found here, with its line number.
+What can be wrong with the text is found here, with its line number. Opening and decoding serve
+Acclaim's files, too.
 """
 
 from __future__ import annotations
@@ -8,13 +9,15 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 import re
 from itertools import accumulate
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from ..errors import BvhError
+from ..errors import BvhError, MotionFileError
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # No position or angle is larger; beyond 3e38 float32 overflows.
@@ -26,10 +29,24 @@ _TIME = re.compile(r"^[ \t]*Frame[ \t]*Time\b[^\n]*(?:\n|\Z)", re.MULTILINE | re
 _MORE = re.compile(r"([ \t]*(Frames\b|#|//)[^\n]*(?:\n|\Z)|[ \t]*\n)*", re.IGNORECASE)
 
 
-def decode(data: bytes, where) -> str:
-    """Text of a file in UTF-8, UTF-16 with its mark, or Latin-1; line ends as \\n."""
+def opened(path: str | os.PathLike, error: type[MotionFileError] = BvhError) -> bytes:
+    """What is in a file; an error of the kind given if that can't be told."""
+    if not isinstance(path, str | os.PathLike):
+        raise error(f"{path!r} is not a path; give the file to read.")
+    try:
+        return Path(path).read_bytes()
+    except (OSError, ValueError) as fault:  # ValueError: a path with a zero byte
+        reason = getattr(fault, "strerror", None) or fault
+        raise error(f"{path}: can't be opened ({reason}); check path and rights.") from fault
+
+
+def decode(data: bytes, where, kind: str = "BVH", error: type[MotionFileError] = BvhError) -> str:
+    """Text of a file in UTF-8, UTF-16 with its mark, or Latin-1; line ends as \\n.
+
+    kind, error : what the file should be, and the error if it is not.
+    """
     if not data.strip():
-        raise BvhError(f"{where}, line 1: the file is empty; copy or download it again.")
+        raise error(f"{where}, line 1: the file is empty; copy or download it again.")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
     else:
@@ -43,16 +60,19 @@ def decode(data: bytes, where) -> str:
         text = text.rstrip("\x1a \t\n") + "\n"
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise BvhError(f"{where}, line {line}: binary data, not BVH text; export or copy it again.")
+        raise error(f"{where}, line {line}: binary data, not {kind} text; export or copy it again.")
     return text
 
 
 def split(text: str, where) -> tuple[list[str], int]:
     """Header lines up to the first row of numbers, and the offset of that."""
     if not _START.match(text):
+        remedy = (
+            "read it with read_amc" if str(where).lower().endswith(".amc") else "export it as BVH"
+        )
         raise BvhError(
             f"{where}, line 1: a BVH file starts with HIERARCHY, this one with "
-            f"{text.lstrip()[:20]!r}; export it as BVH."
+            f"{text.lstrip()[:20]!r}; {remedy}."
         )
     motion = _MOTION.search(text)
     if motion is None:

@@ -163,7 +163,7 @@ def prepare(
 
     Parameters
     ----------
-    source : the name of a data set, a folder of BVH files, or one of `DANCES`.
+    source : the name of a data set, a folder of motion files, or one of `DANCES`.
     progress : show how far it is.
     permissive : leave out clips whose licence forbids commercial use (of a data set).
     reading : how to read a folder's files, such as `units`, `up` or `skip_bad`; see

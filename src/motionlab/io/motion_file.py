@@ -1,0 +1,31 @@
+"""A file of motion, read by what its name ends in."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..motion import Motion
+from . import acclaim, bvh_reading
+from .bvh_reading import Doubts, Reading
+
+_READERS = {".bvh": bvh_reading.read, ".amc": acclaim.read}
+SUFFIXES = tuple(_READERS)
+
+
+def is_motion(path: Path) -> bool:
+    """Whether a file's name says that it is one of motion."""
+    return path.suffix.lower() in _READERS
+
+
+def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tuple[Motion, Doubts]:
+    """The motion in a file, and what to warn of; what ends in none of `SUFFIXES` is read as BVH.
+
+    Raises
+    ------
+    MotionFileError : the file can't be read; the message names file and remedy.
+    """
+    ending = Path(path).suffix.lower() if isinstance(path, str | os.PathLike) else ""
+    if ending == ".asf":  # which is half a motion, as its reader says
+        return acclaim.read(path, how, source)
+    return _READERS.get(ending, bvh_reading.read)(path, how, source)
