@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import time
+import warnings
+from dataclasses import replace
 
 import bvh_corpus as corpus
 import numpy as np
@@ -175,6 +177,7 @@ def test_ten_thousand_joints(shape, tmp_path):
 
 
 @pytest.mark.parametrize("units, metres", [("m", 1), ("cm", 0.01), ("in", 0.0254), (0.2, 0.2)])
+@pytest.mark.filterwarnings("ignore:.*longest way")  # nobody is that large
 def test_units(units, metres):
     motion = parse_bvh(corpus.PLAIN.encode(), "x.bvh", units=units)
     torch.testing.assert_close(motion.positions(), plain().positions() * metres / 0.01)
@@ -234,6 +237,20 @@ def test_wrong_units_are_noticed(tmp_path):
     write_bvh(motion, tmp_path / "clip.bvh", units="m")
     with pytest.warns(UserWarning, match="units='cm'"):
         read_bvh(tmp_path / "clip.bvh")
+
+
+@pytest.mark.parametrize("units, said", [("cm", []), ("m", [True]), ("mm", [True])])
+def test_wrong_units_are_noticed_where_feet_are_not_known(tmp_path, units, said):
+    body = Skeleton.canonical()
+    names = [re.sub("Foot$", "_17", re.sub("Toes$", "_18", name)) for name in body.names]
+    body = replace(body, names=names, roles=None)
+    still = Motion(body, torch.zeros(2, 3), torch.eye(3).expand(2, 21, 3, 3), fps=30)
+    assert "left_foot" not in still.skeleton.roles
+    write_bvh(still, tmp_path / "clip.bvh", units=units)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        read_bvh(tmp_path / "clip.bvh")
+    assert [f"units='{units}' makes it" in str(each.message) for each in told] == said
 
 
 # -- writing ------------------------------------------------------------------------------------

@@ -13,6 +13,10 @@ UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.304
 # a child of two years 0.7. Of adults in inches that are read as centimetres it makes 0.53 to 0.71.
 HEIGHTS = (0.7, 2.2)
 _USUAL = 1.5
+# The same between the two joints that are farthest from each other, such as hand and foot of a
+# person. Wide: it may be an arm alone, or half a horse.
+SPANS = (0.1, 10.0)
+_USUAL_SPAN = 2.0
 
 
 def in_metres(units: str | float) -> float:
@@ -34,20 +38,27 @@ def is_positive(value) -> bool:
 
 
 def doubt_units(skeleton: Skeleton, units: str | float) -> str | None:
-    """What to say if the body is not of the size of a person, read in these units."""
-    height = foot_to_head(skeleton)
-    if height is None or HEIGHTS[0] <= height <= HEIGHTS[1]:
+    """What to say if the body is not of the size of a person, read in these units.
+
+    Where some of its joints are known, but foot or head is not, only what can be no body is told.
+    """
+    length, (least, most), usual = foot_to_head(skeleton), HEIGHTS, _USUAL
+    said = "from foot to head the body measures"
+    if length is None and skeleton.roles:
+        length, (least, most), usual = longest_way(skeleton), SPANS, _USUAL_SPAN
+        said = "the longest way along the body's bones, from joint to joint, measures"
+    if length is None or least <= length <= most:
         return None
-    raw = height / in_metres(units)
-    said = f"from foot to head the body measures {float(f'{height:.3g}'):g} m in units={units!r}"
+    raw = length / in_metres(units)
+    said += f" {float(f'{length:.3g}'):g} m in units={units!r}"
     if raw < 1e-9:
         return f"{said}; its bones have no length, export it with its offsets."
-    best = min(UNITS, key=lambda unit: abs(math.log(raw * UNITS[unit] / _USUAL)))
-    if HEIGHTS[0] <= raw * UNITS[best] <= HEIGHTS[1]:
+    best = min(UNITS, key=lambda unit: abs(math.log(raw * UNITS[unit] / usual)))
+    if least <= raw * UNITS[best] <= most:
         better = f"units={best!r} makes it {raw * UNITS[best]:.2f} m"
     else:
         better = (
-            f"of {', '.join(UNITS)} none fits, metres per unit do, about units={_USUAL / raw:.2g}"
+            f"of {', '.join(UNITS)} none fits, metres per unit do, about units={usual / raw:.2g}"
         )
     return f"{said}, as no person does; pass another unit: {better}."
 
@@ -62,6 +73,17 @@ def foot_to_head(skeleton: Skeleton) -> float | None:
     ways = [set(ancestors(skeleton, joint)) for joint in (foot, roles["head"])]
     # what is above the hips, such as a root on the floor, is on both ways and on neither's own
     return float(skeleton.offsets[list(ways[0] ^ ways[1])].norm(dim=-1).sum())
+
+
+def longest_way(skeleton: Skeleton) -> float:
+    """Metres along the bones between the two joints that are farthest from each other."""
+    lengths = skeleton.offsets.norm(dim=-1).tolist()
+    longest, deepest = 0.0, [0.0] * skeleton.joints
+    for joint in reversed(range(1, skeleton.joints)):  # parents come before their children
+        parent, below = skeleton.parents[joint], deepest[joint] + lengths[joint]
+        longest = max(longest, deepest[parent] + below)
+        deepest[parent] = max(deepest[parent], below)
+    return longest
 
 
 def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
