@@ -4,9 +4,9 @@
 
 Each page is opened from disk and from a local server, on a desktop and on a phone. It fails if a
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
-if a formula stays TeX; if a player stands still, or does not follow its slider; if a scene stays
-empty or does not follow its own; if a network does not load and move, or too slowly. It waits as
-long as a busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
+if a formula stays TeX; if a player stands still, does not follow its slider or saves nothing; if a
+scene stays empty or does not follow its own; if a network does not load and move, or too slowly. It
+waits as long as a busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
 PATH (or its path in CHROMIUM).
 """
 
@@ -132,6 +132,19 @@ class Visit:
         self._scrub(slider, 0.7, name)
         if not self._until(lambda: self._picture(player) != first):
             self.trouble(f"{name} shows the same picture wherever its slider stands")
+        if number == 0:  # one tells of all
+            self._check_saving(player, name)
+
+    def _check_saving(self, player, name: str) -> None:
+        try:
+            player.get_by_role("button", name="Save as a file").click(timeout=PATIENCE)
+            with self.page.expect_download(timeout=PATIENCE) as waiting:
+                player.get_by_role("button", name=".bvh").first.click(timeout=PATIENCE)
+            text = Path(waiting.value.path()).read_text(encoding="utf-8")
+        except TimeoutError:
+            text = ""
+        if not text.startswith("HIERARCHY"):
+            self.trouble(f"{name} can't be saved")
 
     def _scrub(self, slider, share: float, name: str) -> None:
         """Take the slider to a share of its way; the player must leave it there."""

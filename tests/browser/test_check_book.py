@@ -65,5 +65,9 @@ def test_planted_fault_is_found(troubles, number, expected):
     assert any(f"fault{number}.html" in line and expected in line for line in troubles), troubles
 
 
+def test_a_player_that_saves_nothing_is_found(troubles):
+    assert any("player 1 can't be saved" in line for line in troubles), troubles
+
+
 def test_good_pages_pass(troubles):
     assert not [line for line in troubles if "index.html" in line or "search" in line]

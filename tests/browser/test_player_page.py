@@ -126,7 +126,7 @@ def test_dragging_turns_the_view(browser, page_file):
 def test_every_control_has_a_name_and_takes_focus(browser, page_file):
     with opened(browser, page_file) as page:
         controls = first(page).locator("button:visible, input, select, canvas")
-        assert controls.count() == 6
+        assert controls.count() == 7
         for i in range(controls.count()):
             assert controls.nth(i).get_attribute("aria-label")
             controls.nth(i).focus()

@@ -1,11 +1,13 @@
 // The row of controls below the picture. Plain HTML controls, so that keyboard, touch and screen
 // readers work as everywhere.
+import { SaveRow } from "./save_row.js";
 
 const ICONS = {
   play: "M8 5v14l11-7z",
   pause: "M6 5h4v14H6zM14 5h4v14h-4z",
   follow: "M12 8a4 4 0 1 0 0 8 4 4 0 0 0 0-8zm9 3h-2.1A7 7 0 0 0 13 5.1V3h-2v2.1A7 7 0 0 0 5.1 11H3v2h2.1A7 7 0 0 0 11 18.9V21h2v-2.1a7 7 0 0 0 5.9-5.9H21zm-9 6a5 5 0 1 1 0-10 5 5 0 0 1 0 10z",
   overlay: "M4 4h11v3h-2V6H6v7h1v2H4zm5 5h11v11H9zm2 2v7h7v-7z",
+  save: "M11 3h2v9.2l3.6-3.6L18 10l-6 6-6-6 1.4-1.4 3.6 3.6zM4 18h2v2h12v-2h2v4H4z",
   reset: "M12 5V1L7 6l5 5V7a5 5 0 1 1-5 5H5a7 7 0 1 0 7-7z",
 };
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
@@ -49,9 +51,13 @@ export class Bar {
     this.follow = button("follow", "Follow with the camera", () => player.set("follow", !player.follow));
     this.overlay = button("overlay", "Show all in one picture", () => player.set("overlay", !player.overlay));
     this.reset = button("reset", "Reset view and time", () => player.reset());
+    this.saving = new SaveRow(player);
+    this.save = button("save", "Save as a file", () => this.saving.toggle(this.save));
+    this.save.setAttribute("aria-expanded", "false");
     this.overlay.hidden = !several;
-    this.element.append(this.play, this.slider, this.time, this.speed, this.follow, this.overlay, this.reset);
+    this.element.append(this.play, this.slider, this.time, this.speed, this.follow, this.overlay, this.reset, this.save);
     if (player.payload?.choose) this.element.append(this.chooser(player));
+    this.element.append(this.saving.element);
   }
 
   /** A slider over motions of which one is seen at a time: another temperature, another weight. */
@@ -93,5 +99,6 @@ export class Bar {
       this.choice.setAttribute("aria-valuetext", this.names[chosen]);
       this.name.value = this.names[chosen];
     }
+    this.saving.show();
   }
 }

@@ -1,6 +1,7 @@
 // A figure made of tapered capsules, kept in one mesh: its vertices are moved on the processor
 // (some 5000 of them), which costs less than a draw call for every bone.
 import { BackSide, BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Group, Mesh, MeshBasicMaterial, MeshStandardMaterial } from "three";
+import { cross } from "./kinematics.js";
 
 const SIDES = 16; // vertices around a bone
 const CAP = 6; // rings of each round end
@@ -115,5 +116,3 @@ function frameAlong(x, y, z) {
   across = across.map((value) => value / size);
   return [along, across, cross(along, across)];
 }
-
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

@@ -1,10 +1,16 @@
 // The payload written by motionlab/viewer/live/player.py, read back: where every point is at any time.
+import { fitted } from "./fit.js";
+import { fromEuler, matrices, place } from "./kinematics.js";
 
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 const ROOT_UNIT = 1e-4; // metres
+const TURN_UNIT = Math.PI / 2 ** 15; // radians: the sixteen bits of a number go round as an angle does
 const SMOOTH = 0.45; // seconds on each side over which the followed path is averaged
 
-/** The numbers (frames, width) that player.py's in_few_bytes wrote as changes of their changes. */
+/**
+ * The numbers (frames, width) that player.py's in_few_bytes wrote as changes of their changes. Sums past
+ * the sixteenth bit go round, there and here.
+ */
 export function fromFewBytes(sent, frames, width) {
   const numbers = new Int16Array(frames * width);
   for (let i = 0, at = 0; i < numbers.length; i++) {
@@ -19,22 +25,62 @@ export function fromFewBytes(sent, frames, width) {
   return numbers;
 }
 
-/** One motion: whole numbers are read at the start, metres worked out for the frame that is drawn. */
+/** One motion: what was sent is worked out at the start, frames in between when they are drawn. */
 export class Track {
+  /** `data`: a track of the payload, and what is said of its body. */
   constructor(data, stride, fps) {
-    Object.assign(this, { label: data.label, color: data.color, bones: data.bones, extras: data.extras });
+    const { label, name, color, skeleton, middle, bones, extras, contactPoints } = data;
+    Object.assign(this, { label, name, color, skeleton, middle, bones, extras, contactPoints });
     this.stride = stride; // motion frames from one stored frame to the next
     this.stored = data.frames;
-    this.pointCount = data.points;
-    this.scale = data.scale;
-    this.root = new Int32Array(bytes(data.root));
-    this.local = fromFewBytes(new Uint8Array(bytes(data.local)), data.frames, 3 * data.points);
+    this.rate = fps / stride; // stored frames in a second
+    this.pointCount = skeleton.parents.length + skeleton.end_parents.length;
+    this.angles = data.turns ? fromFewBytes(new Uint8Array(bytes(data.turns)), data.frames, 3 * skeleton.parents.length) : null;
+    // where the middle of the body is, (frames, 3), and all points from there, (frames, points, 3), metres
+    this.root = Float64Array.from(new Int32Array(bytes(data.root)), (steps) => steps * ROOT_UNIT);
+    this.local = this.angles ? this.turnedPoints() : this.sentPoints(data);
     this.contacts = data.contacts ? new Uint8Array(bytes(data.contacts)) : null;
-    this.contactPoints = data.contact_points;
     this.points = new Float32Array(3 * (this.pointCount + this.extras.length));
     this.rootNow = [0, 0, 0];
     this.now = 0;
     this.way = smoothCourse(this, fps);
+  }
+
+  sentPoints({ local, frames, scale }) {
+    return Float32Array.from(fromFewBytes(new Uint8Array(bytes(local)), frames, 3 * this.pointCount), (steps) => steps * scale);
+  }
+
+  /** Points of a motion that was sent as rotations; `root`, which was the root joint's, becomes the middle's. */
+  turnedPoints() {
+    const { skeleton, middle, pointCount, root, angles } = this;
+    const [locals, turns] = [matrices(skeleton), matrices(skeleton)];
+    const points = new Float64Array(3 * pointCount);
+    const local = new Float32Array(this.stored * points.length);
+    for (let frame = 0; frame < this.stored; frame++) {
+      locals.forEach((matrix, joint) => {
+        const at = 3 * (frame * locals.length + joint);
+        fromEuler([angles[at] * TURN_UNIT, angles[at + 1] * TURN_UNIT, angles[at + 2] * TURN_UNIT], skeleton.orders[joint], matrix);
+      });
+      place(skeleton, [0, 0, 0], locals, turns, points);
+      for (let i = 0; i < points.length; i++) local[frame * points.length + i] = points[i] - points[3 * middle + (i % 3)];
+      for (let axis = 0; axis < 3; axis++) root[3 * frame + axis] += points[3 * middle + axis];
+    }
+    return local;
+  }
+
+  /** What a file holds of it: {skeleton, fps, root (frames, 3), angles (frames, joints, 3)}; metres, radians. */
+  clip() {
+    const { skeleton, middle, rate: fps, angles, pointCount } = this;
+    const frames = Array.from({ length: this.stored }, (_, frame) => this.whole(frame));
+    if (!angles) return { skeleton, fps, ...fitted(skeleton, frames, drawn(this), middle) };
+    const root = frames.flatMap((points) => Array.from(points.subarray(0, 3)));
+    return { skeleton, fps, root, angles: Array.from(angles, (steps) => steps * TURN_UNIT) };
+  }
+
+  /** All points of a stored frame in the world. */
+  whole(frame) {
+    const width = 3 * this.pointCount;
+    return Float64Array.from({ length: width }, (_, i) => this.root[3 * frame + (i % 3)] + this.local[frame * width + i]);
   }
 
   /** Fill `points` (metres) for a frame of the motion; frames between stored ones are mixed. */
@@ -44,15 +90,15 @@ export class Track {
     const after = Math.min(before + 1, this.stored - 1);
     const mix = at - before;
     this.now = Math.round(at);
-    const { root, local, points, pointCount, scale } = this;
+    const { root, local, points, pointCount } = this;
     for (let axis = 0; axis < 3; axis++) {
       const from = root[3 * before + axis];
-      this.rootNow[axis] = (from + mix * (root[3 * after + axis] - from)) * ROOT_UNIT;
+      this.rootNow[axis] = from + mix * (root[3 * after + axis] - from);
     }
     const width = 3 * pointCount;
     for (let i = 0; i < width; i++) {
       const from = local[before * width + i];
-      points[i] = (from + mix * (local[after * width + i] - from)) * scale + this.rootNow[i % 3];
+      points[i] = from + mix * (local[after * width + i] - from) + this.rootNow[i % 3];
     }
     addExtras(points, pointCount, this.extras);
   }
@@ -108,8 +154,7 @@ export class Track {
     if (this.box) return this.box;
     const box = [Infinity, Infinity, -Infinity, -Infinity];
     for (let i = 0; i < this.root.length; i += 3) {
-      const x = this.root[i] * ROOT_UNIT;
-      const z = this.root[i + 2] * ROOT_UNIT;
+      const [x, z] = [this.root[i], this.root[i + 2]];
       box[0] = Math.min(box[0], x);
       box[1] = Math.min(box[1], z);
       box[2] = Math.max(box[2], x);
@@ -121,7 +166,7 @@ export class Track {
 
 /** Running mean of a track's root on the floor: x, z per stored frame. No lag, same in any order. */
 function smoothCourse(track, fps) {
-  let course = Array.from({ length: track.stored }, (_, i) => [track.root[3 * i] * 1e-4, track.root[3 * i + 2] * 1e-4]);
+  let course = Array.from({ length: track.stored }, (_, i) => [track.root[3 * i], track.root[3 * i + 2]]);
   const half = Math.round((SMOOTH * fps) / track.stride);
   for (let pass = 0; pass < 2; pass++) {
     const sums = [[0, 0]];
@@ -145,7 +190,13 @@ export function addExtras(points, count, extras) {
   });
 }
 
+/** Indices of the points that are drawn. Others, such as an engine's helpers, may be anywhere. */
+function drawn({ bones, extras, pointCount }) {
+  const ends = bones.flatMap(([a, b]) => [a, b]).flatMap((end) => (end < pointCount ? [end] : extras[end - pointCount].slice(0, 2)));
+  return new Set(ends);
+}
+
 export function decode(payload) {
-  if (payload.version !== 1) throw new Error(`motion payload of version ${payload.version}; this player reads 1`);
-  return payload.tracks.map((data) => new Track(data, payload.stride, payload.fps));
+  if (payload.version !== 2) throw new Error(`motion payload of version ${payload.version}; this player reads 2`);
+  return payload.tracks.map((data) => new Track({ ...payload.bodies[data.body], ...data }, payload.stride, payload.fps));
 }

@@ -11,6 +11,7 @@ import { currentTheme, THEMES, watchTheme } from "./theme.js";
 
 const REDUCED = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)");
 const SLOW = 0.05; // seconds from picture to picture above which they get fewer pixels
+export const TWIST = "made from points: how bones lie is known, how they are twisted about themselves is not.";
 const LEAST_HEIGHT = 1.5; // metres that a view shows
 
 export class Player {
@@ -152,6 +153,16 @@ export class Player {
   reset() {
     this.lookFromStart();
     this.scrub(0);
+  }
+
+  /** The tracks that can be saved: all that can be seen now. */
+  get saved() { return this.payload.choose ? [this.tracks[this.chosen]] : this.tracks; }
+
+  /** What a saved file holds, in words. */
+  get savedHow() {
+    const [track] = this.tracks;
+    const exact = track.angles ? "root to 0.1 mm, joints to 0.01°." : TWIST;
+    return `${Number(track.rate.toPrecision(4))} frames a second, ${exact}`;
   }
 
   // -- time ---------------------------------------------------------------------------------------

@@ -6,6 +6,8 @@ const SAVE_EVERY = 200; // milliseconds: while it plays the kernel hears of the 
 
 function render({ model, el }) {
   const host = document.createElement("div");
+  // JupyterLab has its own use for arrows and space; it looks for this mark from the focused element upwards.
+  host.dataset.lmSuppressShortcuts = "";
   el.append(host);
   let player;
   let saved = 0;
@@ -31,8 +33,6 @@ function render({ model, el }) {
     for (const name of SHARED) player.set(name, model.get(name));
     player.setFrame(model.get("frame"));
     if (reduced) player.pause();
-    // JupyterLab has its own use for arrows and space; it looks for this mark on the focused element.
-    for (const control of host.querySelectorAll("canvas, button, input, select")) control.dataset.lmSuppressShortcuts = "";
     const caption = document.createElement("figcaption");
     caption.textContent = model.get("caption");
     if (caption.textContent) host.append(caption);

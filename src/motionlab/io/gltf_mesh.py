@@ -45,12 +45,17 @@ def bind_pose(motion: Motion) -> Motion:
     """
     skeleton = motion.skeleton
     pose = torch.eye(3).expand(skeleton.joints, 3, 3)
-    if not (skeleton.roles.keys() >= _STANDING and stands(skeleton)):
+    if not rest_stands(skeleton):
         rotations = motion.rotations.detach().cpu().double()
         ahead = yaw_matrix(-heading(rotations[:, 0])) @ rotations[:, 0]
         mean = torch.cat([ahead[:, None], rotations[:, 1:]], dim=1).mean(0)
         pose = roma.special_procrustes(mean)
     return Motion(skeleton, torch.zeros(1, 3), pose[None], 1)
+
+
+def rest_stands(skeleton: Skeleton) -> bool:
+    """Whether a mannequin can be put on in the rest pose: a standing person, as far as is known."""
+    return skeleton.roles.keys() >= _STANDING and stands(skeleton)
 
 
 def mannequin(bound: Motion) -> Skin | None:

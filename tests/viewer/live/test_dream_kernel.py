@@ -75,7 +75,7 @@ def test_a_change_brings_another_motion_and_back_the_same(box, field, value):
 def test_characters_are_futures_of_one_start_in_one_picture(box):
     fields(box)["Characters"].value = 3
     content = player(box).payload
-    assert len({track["local"] for track in content["tracks"]}) == 3
+    assert len({track["turns"] for track in content["tracks"]}) == 3
     assert player(box).overlay
 
 

@@ -112,7 +112,7 @@ def test_a_page_is_the_motion_of_the_kernel(page, monkeypatch):
     content = json.loads(re.search(r'<script type="application/json">(.*?)</script>', text)[1])
     box = knobs(make, VALUES, start={"rise": 0.1})
     live = box.children[0].payload["tracks"][0]
-    assert live["local"] == content["tracks"][content["chosen"]]["local"]
+    assert live["turns"] == content["tracks"][content["chosen"]]["turns"]
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def unpack(track: dict) -> np.ndarray:
     """What the browser reads (web/src/motion.js): positions (frames, points, 3) in metres."""
     root = np.frombuffer(base64.b64decode(track["root"]), "<i4").reshape(-1, 1, 3) * 1e-4
     local = read_few_bytes(base64.b64decode(track["local"]), len(root))
-    return root + local.reshape(len(root), track["points"], 3) * track["scale"]
+    return root + local.reshape(len(root), -1, 3) * track["scale"]
 
 
 def read_few_bytes(sent: bytes, frames: int) -> np.ndarray:
@@ -50,7 +50,8 @@ def read_few_bytes(sent: bytes, frames: int) -> np.ndarray:
         if byte < 128:
             bent.append(-(value + 1) // 2 if value & 1 else value // 2)
             value = shift = 0
-    return np.array(bent).reshape(frames, -1).cumsum(0).cumsum(0)
+    # sixteen bits go round
+    return np.array(bent).reshape(frames, -1).cumsum(0).cumsum(0).astype(np.int16)
 
 
 # --- what is sent --------------------------------------------------------------------------------
@@ -125,9 +126,9 @@ def test_fast_clips_are_thinned_and_keep_their_own_clock():
 
 def test_contacts_become_one_byte_a_frame():
     down = torch.tensor([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1]], dtype=torch.bool)
-    track = payload([Track(standing(3).positions(), CANONICAL, contacts=down)], 30)["tracks"][0]
-    assert list(base64.b64decode(track["contacts"])) == [1, 2, 12]
-    assert len(track["contact_points"]) == 4
+    sent = payload([Track(standing(3).positions(), CANONICAL, contacts=down)], 30)
+    assert list(base64.b64decode(sent["tracks"][0]["contacts"])) == [1, 2, 12]
+    assert len(sent["bodies"][0]["contactPoints"]) == 4
 
 
 def test_a_root_that_stays_behind_costs_no_precision():
@@ -149,6 +150,13 @@ def test_an_exploded_motion_is_cut_off_with_a_warning():
     with pytest.warns(UserWarning, match="exploded"):
         track = payload([Track(points, CANONICAL)], 30)["tracks"][0]
     assert np.isfinite(unpack(track)).all()
+
+
+def test_a_motion_too_far_away_is_held_with_a_warning():
+    motion = standing(2, at=(1e6, 0.9, 0.0))
+    with pytest.warns(UserWarning, match="exploded"):
+        (track,) = payload([Track(motion.positions(), CANONICAL, motion=motion)], 30)["tracks"]
+    assert np.frombuffer(base64.b64decode(track["root"]), "<i4")[0] == 2**31 - 1
 
 
 def test_nan_is_refused_with_its_frame_and_joint():
@@ -339,4 +347,5 @@ def test_one_of_several_can_be_chosen():
 
 def test_joints_alone_are_shown_too():
     joints = standing(5).positions()[:, : CANONICAL.joints]
-    assert show(joints, skeleton=CANONICAL, fps=30).payload["tracks"][0]["points"] == 21
+    (body,) = show(joints, skeleton=CANONICAL, fps=30).payload["bodies"]
+    assert (len(body["skeleton"]["names"]), body["skeleton"]["end_parents"]) == (21, [])

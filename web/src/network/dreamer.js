@@ -53,7 +53,7 @@ export class Dreamer {
       cell: layers(start.cell),
       place: this.encoding.begin(start.frame),
       random: new Random(1000 * this.settings.seed + number),
-      track: new LiveTrack(this.encoding.count, this.fps, this.last, this.look),
+      track: new LiveTrack(this.encoding, this.fps, this.last, this.look),
     };
     [character.next] = this.network.predict([character]);
     this.characters[number] = character;
@@ -93,7 +93,7 @@ export class Dreamer {
   show(character, row) {
     const { track, place } = character;
     this.encoding.points(row, place, track.room(this.last));
-    track.add(this.last, place, this.encoding.touching(row));
+    track.add(this.last, row, place);
   }
 
   normalize(row) {

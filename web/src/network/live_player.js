@@ -2,7 +2,8 @@
 import { Clock } from "../clock.js";
 import { Mannequin } from "../mannequin.js";
 import { Contacts, disposeAll, Tail } from "../marks.js";
-import { Player } from "../player.js";
+import { Player, TWIST } from "../player.js";
+import { KEPT } from "./live_track.js";
 
 const SHARE = 0.5; // of the time between pictures that the network may take; slower machines play slower
 
@@ -47,6 +48,8 @@ export class LivePlayer extends Player {
     for (const control of [this.bar.slider, this.bar.follow]) control.hidden = true;
     this.bar.reset.title = "Begin again";
     this.bar.reset.setAttribute("aria-label", "Begin again");
+    this.bar.save.title = `Save the last ${KEPT} seconds as a file`;
+    this.bar.save.setAttribute("aria-label", this.bar.save.title);
   }
 
   cast(track) {
@@ -60,6 +63,11 @@ export class LivePlayer extends Player {
     this.clock.time = 0;
     this.lookFromStart();
     this.refresh();
+  }
+
+  get savedHow() {
+    const twist = this.dreamer.encoding.locals ? "." : `, ${TWIST}`;
+    return `What was dreamt last, ${KEPT} seconds at most, ${this.dreamer.fps} frames a second${twist}`;
   }
 
   set(name, value) {

@@ -1,17 +1,23 @@
 // A motion that is being made: the last seconds of it, with what the player asks of a Track.
+import { fitted } from "../fit.js";
+import { toEuler } from "../kinematics.js";
 import { addExtras } from "../motion.js";
 
-const KEPT = 20; // seconds that one can go back
+export const KEPT = 20; // seconds that one can go back
 const SMOOTH = 0.35; // seconds: a camera that follows ignores what is quicker
 
 export class LiveTrack {
-  /** `first` is the frame it begins with; `look`: label, color, bones, extras, contactPoints, tall. */
-  constructor(pointCount, fps, first, look) {
+  /**
+   * `first` is the frame it begins with; `look`: label, name, color, skeleton, middle, bones, extras,
+   * contactPoints, tall.
+   */
+  constructor(encoding, fps, first, look) {
+    const pointCount = encoding.count;
     Object.assign(this, look);
-    Object.assign(this, { pointCount, first, last: first - 1, now: first });
+    Object.assign(this, { encoding, fps, pointCount, first, last: first - 1, now: first });
     this.size = Math.round(KEPT * fps);
     this.ease = 1 / (SMOOTH * fps);
-    this.frames = Array.from({ length: this.size }, () => null); // {points, contacts, middle}
+    this.frames = Array.from({ length: this.size }, () => null); // {points, contacts, middle, yaw, row, place}
     this.points = new Float32Array(3 * (pointCount + this.extras.length));
   }
 
@@ -21,12 +27,15 @@ export class LiveTrack {
     return slot.points;
   }
 
-  add(frame, { x, z, yaw }, contacts) {
+  /** Say of a frame, whose points are in their room, which row of features at which place it is. */
+  add(frame, row, place) {
+    const { x, z, yaw } = place;
     const way = [[x, this.way?.[0]], [z, this.way?.[1]]].map(([at, way]) => follow(way, at, this.ease));
     this.way = way;
     // smoothing twice lags twice as much: what is between them makes up for it
     const middle = way.map(([once, twice]) => 2 * once - twice);
-    Object.assign(this.frames[frame % this.size], { contacts, middle, yaw });
+    const contacts = this.encoding.touching(row);
+    Object.assign(this.frames[frame % this.size], { contacts, middle, yaw, row, place });
     this.last = frame;
   }
 
@@ -71,6 +80,23 @@ export class LiveTrack {
   heading() {
     const { yaw } = this.at(this.now);
     return [Math.sin(yaw), Math.cos(yaw)];
+  }
+
+  /** What a file holds of the seconds that are kept, as of a Track. */
+  clip() {
+    const { skeleton, encoding, fps, middle, pointCount } = this;
+    const kept = [];
+    for (let frame = this.oldest; frame <= this.last; frame++) kept.push(this.at(frame));
+    if (!encoding.locals) {
+      const every = new Set(Array(pointCount).keys());
+      return { skeleton, fps, ...fitted(skeleton, kept.map(({ points }) => points), every, middle) };
+    }
+    const scratch = new Float64Array(3 * pointCount);
+    const angles = kept.flatMap(({ row, place }) => {
+      encoding.points(row, place, scratch); // now it knows the rotations, too
+      return encoding.locals.flatMap((matrix, joint) => toEuler(matrix, skeleton.orders[joint]));
+    });
+    return { skeleton, fps, root: kept.flatMap(({ points }) => Array.from(points.subarray(0, 3))), angles };
   }
 
   /** Put where a point was in the last frames, up to now, into a flat array of x y z; the newest last. */

@@ -18,10 +18,9 @@ import numpy as np
 from torch import nn
 
 from ..pictures import palette
-from ..pictures.body import body
-from .dream_settings import check_starts, controls_of, sampled_tracks, trail_of
+from .dream_settings import check_starts, controls_of, name_of, sampled_tracks, trail_of
 from .network_weights import WeightsScript, check_known, weights_script
-from .player import bundle_path, payload
+from .player import bundle_path, dressed, payload
 from .show import still_picture
 
 
@@ -44,13 +43,13 @@ def page_figure(
     check_known(model)
     check_starts(model)
     color = palette.check_color(color)
-    weights = weights_script(model, getattr(model, "about", {}).get("name", "network"))
+    weights = weights_script(model, name_of(model))
     sampling = getattr(model, "sampling", {})
     frames = round(seconds * model.fps)
     tracks = sampled_tracks(model, model.starts, frames, seed=0, color=color, **sampling)
     common = {"height": height, "autoplay": True, "trail": trail_of(trail, tracks)}
     clips = [payload([track], model.fps, follow=True, overlay=False, **common) for track in tracks]
-    dress = body(model.encoding.skeleton)
+    dress = dressed(model.encoding.skeleton)
     live = {
         **common,
         "name": weights.name,
@@ -58,11 +57,10 @@ def page_figure(
         "megabytes": f"{len(weights.text) / 1e6:.1f}",
         "floor": float(np.median([clip["floor"] for clip in clips])),
         "look": {
+            **dress,
             "label": "",
+            "name": name_of(model),
             "color": color,
-            "bones": [list(bone) for bone in dress.bones],
-            "extras": [list(extra) for extra in dress.extras],
-            "contactPoints": list(dress.feet),
             "contacts": "contacts" in model.encoding.slices,
             "tall": max(float(track.positions[..., 1].max()) for track in tracks),
         },

@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from ...encodings import JointAngles
 from ...errors import ViewerError
 from .player import Track
 from .show import trail_points
@@ -72,7 +73,16 @@ def sampled_tracks(
     if encoding.points != skeleton.points:  # joints alone
         skeleton = skeleton.without_end_sites()
     feet = [None] * len(points) if contacts is None else touching(contacts)
-    return [Track(p, skeleton, "", color, f) for p, f in zip(points, feet, strict=True)]
+    motions = [None] * len(points)
+    if isinstance(encoding, JointAngles):
+        motions = [encoding.to_motion(each) for each in features]
+    parts = zip(points, feet, motions, strict=True)
+    return [Track(p, skeleton, "", color, f, name_of(model), m) for p, f, m in parts]
+
+
+def name_of(model: nn.Module) -> str:
+    """What a file is called that is saved of a model's motion."""
+    return getattr(model, "about", {}).get("name", "dream")
 
 
 def trail_of(trail: str | int | Sequence[str | int] | None, tracks: list[Track]) -> list[int]:

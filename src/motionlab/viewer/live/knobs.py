@@ -159,6 +159,7 @@ def made_of(make: Callable, wanted: Mapping[str, float], color: str) -> tuple[Tr
     match found:
         case (Motion() as motion, str(said)):
             positions = motion.positions().detach().cpu()
-            track = Track(positions, motion.skeleton, "", color, motion.contacts)
+            skeleton, name = motion.skeleton, motion.name
+            track = Track(positions, skeleton, "", color, motion.contacts, name, motion)
             return track, float(motion.fps), said
     raise ViewerError(f"knobs: make gave {found!r}; it must give a Motion and a line of text.")

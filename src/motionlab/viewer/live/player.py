@@ -1,8 +1,9 @@
 """The motion player: numbers packed for the browser, as a live widget or as a piece of a page.
 
-A built page has no kernel, so the motion itself travels in it: positions are rounded to a tenth of
-a millimetre, taken relative to the root, and sent as changes of their changes: a body moves on as it
-moved, so that most numbers fit one byte.
+A built page has no kernel, so the motion itself travels in it, and can be saved from there: the
+root's place to a tenth of a millimetre, and every joint's angles to half of 360° / 2^16. Where only
+points are known, they are sent, to a tenth of a millimetre, relative to the root. Numbers are sent as
+changes of their changes: a body moves on as it moved, so that most of them fit one byte.
 """
 
 from __future__ import annotations
@@ -23,13 +24,18 @@ import traitlets
 from torch import Tensor
 
 from ...errors import ViewerError
+from ...io.euler import to_euler
+from ...io.gltf_mesh import rest_stands
+from ...motion import Motion
 from ...skeleton import Skeleton
 from ..pictures.body import Body, body
 
 STATIC = Path(__file__).parent / "static"
 ROOT_UNIT = 1e-4  # metres; an int32 reaches 214 km
+FARTHEST = np.iinfo(np.int32).max
 FINEST = 1e-4  # metres, for points relative to the root: an int16 reaches 3.3 m
 COARSEST = 2e-3  # metres; rounding is then off by half of it, the contract's 1 mm
+TURN = 2 * np.pi / 2**16  # radians; the sixteen bits of a number go round as an angle does
 FLOOR_SLACK = 0.15  # metres
 SHOWN_FPS = 30.0  # a browser mixes frames in between; more would only weigh more
 
@@ -43,6 +49,8 @@ class Track:
     label: str = ""
     color: str = "#9aa3ad"
     contacts: Tensor | None = None  # bool (frames, 4)
+    name: str = ""  # what a file is called that is saved of it
+    motion: Motion | None = None  # with the rotations, where they are known
 
 
 def bundle_path() -> Path:
@@ -82,12 +90,14 @@ def payload(
     the player's clock count the motion's own frames.
     """
     stride = max(1, int(fps / SHOWN_FPS + 1e-3))
+    bodies: list[dict[str, Any]] = []  # that tracks share
     return {
-        "version": 1,
+        "version": 2,
         "fps": fps,
         "frames": max(len(track.positions) for track in tracks),
         "stride": stride,
-        "tracks": [_pack(track, stride) for track in tracks],
+        "tracks": [_pack(track, stride, bodies) for track in tracks],
+        "bodies": bodies,
         "paths": list(paths),
         "trail": [int(point) for point in trail],
         "floor": floor_height(tracks[0]),
@@ -112,22 +122,72 @@ def floor_height(track: Track) -> float:
     return round(sole, 4) if abs(sole) < FLOOR_SLACK else 0.0
 
 
-def _pack(track: Track, stride: int) -> dict[str, Any]:
-    dress = body(track.skeleton)
-    root, local, scale = quantise(track.positions[::stride].numpy(), track.skeleton, dress)
+def dressed(skeleton: Skeleton) -> dict[str, Any]:
+    """A body as the page knows it: its skeleton, to be saved, and its figure, to be drawn."""
+    dress = body(skeleton)
+    return {
+        "skeleton": {
+            "names": list(skeleton.names),
+            "parents": list(skeleton.parents),
+            "offsets": _in_micrometres(skeleton.offsets),
+            "end_parents": list(skeleton.end_parents),
+            "end_offsets": _in_micrometres(skeleton.end_offsets),
+            "orders": list(skeleton.rotation_orders),
+            "stands": rest_stands(skeleton),
+        },
+        "middle": skeleton.roles.get("hips", 0),
+        "extras": [list(extra) for extra in dress.extras],
+        "bones": [list(bone) for bone in dress.bones],
+        "contactPoints": list(dress.feet),
+    }
+
+
+def _in_micrometres(offsets: Tensor) -> list[list[float]]:
+    return offsets.double().numpy().round(6).tolist()
+
+
+def _pack(track: Track, stride: int, bodies: list[dict[str, Any]]) -> dict[str, Any]:
+    """What is sent of a track; its body is added to `bodies` unless it is there."""
+    dress, drawn = dressed(track.skeleton), body(track.skeleton)
+    if dress not in bodies:
+        bodies.append(dress)
+    numbers = (
+        _points(track, stride, drawn) if track.motion is None else _turns(track.motion, stride)
+    )
     return {
         "label": track.label,
+        "name": track.name,
         "color": track.color,
-        "points": local.shape[1],
-        "frames": len(local),
+        "body": bodies.index(dress),
+        "frames": len(range(0, len(track.positions), stride)),
+        "contacts": _bitmask(track.contacts, stride, drawn),
+        **numbers,
+    }
+
+
+def _points(track: Track, stride: int, dress: Body) -> dict[str, Any]:
+    root, local, scale = quantise(track.positions[::stride].numpy(), track.skeleton, dress)
+    return {
         "root": _base64(root, "<i4"),
         "local": _base64(in_few_bytes(local), "u1"),
         "scale": scale,
-        "extras": [list(extra) for extra in dress.extras],
-        "bones": [list(bone) for bone in dress.bones],
-        "head": dress.head,
-        "contacts": _bitmask(track.contacts, stride, dress),
-        "contact_points": list(dress.feet),
+    }
+
+
+def _turns(motion: Motion, stride: int) -> dict[str, Any]:
+    root_positions, rotations = (values[::stride] for values in motion.numpy())
+    root = np.rint(root_positions.astype(np.float64) / ROOT_UNIT)
+    if np.abs(root).max() > FARTHEST:
+        warnings.warn(
+            f"The root lies {np.abs(root_positions).max():.0f} m away: the motion has exploded or is "
+            "not in metres. It is held at 214 km.",
+            stacklevel=4,
+        )
+    angles = to_euler(rotations, motion.skeleton.rotation_orders)
+    steps = np.rint(angles / TURN).astype(np.int64).astype(np.int16)
+    return {
+        "root": _base64(root.clip(-FARTHEST, FARTHEST), "<i4"),
+        "turns": _base64(in_few_bytes(steps), "u1"),
     }
 
 
@@ -144,33 +204,34 @@ def quantise(
     positions = np.asarray(positions, dtype=np.float64)
     _check_finite(positions[:, [*drawn, middle]], [*drawn, middle], skeleton)
     root = np.rint(positions[:, middle] / ROOT_UNIT)
-    limit = np.iinfo(np.int32).max
     local = np.zeros_like(positions)
     local[:, drawn] = positions[:, drawn] - root[:, None] * ROOT_UNIT
     reach = np.abs(local).max(initial=0.0)
     scale = min(max(reach / np.iinfo(np.int16).max, FINEST), COARSEST)
     steps = np.rint(local / scale)
     held = np.iinfo(np.int16).max
-    if np.abs(steps).max(initial=0) > held or np.abs(root).max(initial=0) > limit:
+    if np.abs(steps).max(initial=0) > held or np.abs(root).max(initial=0) > FARTHEST:
         warnings.warn(
             f"A point lies {reach:.0f} m from the hips: the motion has exploded or is not in "
             f"metres. It is shown cut off at {held * scale:.0f} m.",
             stacklevel=4,
         )
-    root = np.clip(root, -limit, limit).astype(np.int32)
+    root = np.clip(root, -FARTHEST, FARTHEST).astype(np.int32)
     return root, np.clip(steps, -held, held).astype(np.int16), scale
 
 
 def in_few_bytes(numbers: np.ndarray) -> np.ndarray:
     """Bytes for int16 numbers (frames, ...): each says how much the change itself has changed.
 
+    What does not fit sixteen bits goes round, and comes back when the page adds it up in sixteen.
     A number takes as many bytes as it needs: seven bits in each, the lowest first, and a high bit
     if more follow; its sign is its lowest bit.
     """
     rest = np.zeros((2, *numbers.shape[1:]), dtype=np.int32)
     bent = np.diff(np.concatenate([rest, numbers]), n=2, axis=0).ravel()
+    bent = bent.astype(np.int16).astype(np.int32)
     unsigned = np.where(bent < 0, -2 * bent - 1, 2 * bent)
-    shifts = np.array([0, 7, 14])  # 18 bits at most: 4 * 2^15, and the sign
+    shifts = np.array([0, 7, 14])
     pieces = unsigned[:, None] >> shifts
     follows = pieces[:, 1:] > 0
     sent = (pieces & 127).astype(np.uint8)

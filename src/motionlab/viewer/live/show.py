@@ -42,6 +42,10 @@ def show(
 ) -> Player | PageFigure:
     """Play one motion, or several side by side or in one picture, on one clock.
 
+    The player's last button saves what is seen as .bvh or .glb, as it is played: of a fast motion at
+    least 30 frames a second, the root to 0.1 mm, joints to 0.01 degrees. Of point positions only how
+    bones lie is known, not how they are twisted, and they keep the skeleton's lengths.
+
     Parameters
     ----------
     motion : a `Motion`, point positions (frames, points, 3) in metres, or a list of either. Points
@@ -166,7 +170,9 @@ def _track(
         )
     label = label or ""
     fallback = color(label, index) if count > 1 or label else color("mocap")
-    return Track(positions, bones, label, check_color(look, "colors") if look else fallback, feet)
+    shade = check_color(look, "colors") if look else fallback
+    name, whole = (motion.name, motion) if isinstance(motion, Motion) else ("", None)
+    return Track(positions, bones, label, shade, feet, name, whole)
 
 
 def _per_motion(name: str, value: Any, count: int) -> list[str | None]:
