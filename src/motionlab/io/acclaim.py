@@ -20,11 +20,12 @@ from ..motion import Motion
 from ..skeleton import Skeleton
 from .acclaim_frames import AcclaimFrames, parse_frames
 from .acclaim_skeleton import ROOT, AcclaimSkeleton, parse_skeleton
-from .bvh_reading import RIGID, Doubts, Reading, frames_to_skip
+from .bvh_reading import Doubts, Reading, frames_to_skip
 from .bvh_text import opened
 from .bvh_units import doubt_units, in_metres
 from .bvh_up import doubt_up, turn_up
 from .euler import from_euler
+from .rigid import RIGID
 
 _INCH = 0.0254
 _NAMED = re.compile(rb"^#!OML:ASF[ \t]+(?:.*[\\/])?([^\\/\r\n]+?)[ \t]*\r?$", re.MULTILINE)

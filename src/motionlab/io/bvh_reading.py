@@ -7,17 +7,15 @@ import re
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pybvh
-import torch
 from pybvh.bvhnode import BvhNode
 
 from ..errors import BvhError, SkeletonError
 from ..motion import Motion
-from ..skeleton import Skeleton
+from . import rigid
 from .bvh_header import Layout, Tree
 from .bvh_rate import rate_of
 from .bvh_text import decode, last_line, opened, parse_rows, split
@@ -25,8 +23,6 @@ from .bvh_units import doubt_units, in_metres, is_positive
 from .bvh_up import check_up, doubt_up, turn_up
 from .euler import from_euler
 
-# Bones are rigid here. Position channels of inner joints may wobble by this much, in metres.
-RIGID = 0.001
 # What to say to the reader of a file, by what it is about: "units", "up", "frames", ...
 Doubts = dict[str, str]
 
@@ -83,9 +79,11 @@ def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, D
     skip = frames_to_skip(angles, how, where)
     units = "cm" if how.units is None else how.units
     metres = in_metres(units)
-    body = _Body(nodes, tree, where, metres)
+    body = _joints(nodes, tree, where, metres)
     shifts = {joint: shift[skip:] * metres for joint, shift in shifts.items()}
-    motion = body.motion(angles[skip:], shifts, how.rigid == "mean", float(rate), source)
+    rotations = from_euler(angles[skip:], body.orders)
+    motion = body.motion(rotations, shifts, float(rate), mean=how.rigid == "mean")
+    motion = replace(motion, name=Path(where).stem, source=source)
     motion = turn_up(_with_roles(motion, how, where), how.up)  # which asks where the trunk is
     doubts |= body.doubts
     doubts["units"] = doubt_units(motion.skeleton, units)
@@ -151,108 +149,19 @@ def _parse_tree(tree: Tree, where) -> list[BvhNode]:
             ) from error
 
 
-class _Body:
-    """Joints and end sites of a tree, in metres, and the motion that they make."""
-
-    def __init__(self, nodes: list[BvhNode], tree: Tree, where, metres: float) -> None:
-        self.tree, self.where = tree, where
-        self.doubts: dict[str, str] = {}
-        self.names = list(tree.joints)
-        joints = [node for node in nodes if not node.is_end_site()]
-        index = {id(node): i for i, node in enumerate(joints)}
-        self.parents = [-1 if node.parent is None else index[id(node.parent)] for node in joints]
-        self.orders = tree.orders
-        self.offsets = np.array([node.offset for node in joints]) * metres
-        # in the order of their joints, so that a clip written and read again keeps its points
-        ends = [(index[id(node.parent)], node.offset) for node in nodes if node.is_end_site()]
-        ends.sort(key=lambda end: end[0])
-        self.end_parents = [parent for parent, _ in ends]
-        self.end_offsets = np.array([offset for _, offset in ends]).reshape(-1, 3) * metres
-
-    def motion(
-        self, angles: np.ndarray, shifts: dict[int, np.ndarray], mean: bool, fps: float, source: str
-    ) -> Motion:
-        """angles : (frames, joints, 3) degrees; shifts : of some joints, (frames, 3) metres;
-        mean : joints that slide get their mean offset."""
-        rotations = from_euler(angles, self.orders)
-        first, last, root, turn = self._fold(rotations, shifts)
-        rotations = rotations[:, first:last]
-        rotations[:, 0] = turn
-        self._rigid_offsets(range(first + 1, last), shifts, mean)
-        ends = [i for i, parent in enumerate(self.end_parents) if first <= parent < last]
-        skeleton = Skeleton(
-            tuple(self.names[first:last]),
-            tuple(max(parent - first, -1) for parent in self.parents[first:last]),
-            torch.from_numpy(self.offsets[first:last]),
-            tuple(self.end_parents[i] - first for i in ends),
-            torch.tensor(self.end_offsets[ends]),
-            tuple(self.orders[first:last]),
-        )
-        return Motion(skeleton, root, rotations, fps, name=Path(self.where).stem, source=source)
-
-    def _fold(self, rotations: np.ndarray, shifts: dict[int, np.ndarray]):
-        """Fold a root that only carries the body, which is not where its OFFSET says, into it: the
-        root's pose times the body's. (Compared with the OFFSET so that one frame tells, too.)
-
-        Returns the range of joints that are left, and the first one's positions (frames, 3) and
-        orientations (frames, 3, 3).
-        """
-        first, last = 0, len(self.names)
-        root = shifts.get(0, np.tile(self.offsets[0], (len(rotations), 1)))
-        turn = rotations[:, 0].astype(np.float64)
-        while (body := self._carried(first, last, shifts)) is not None:
-            left_out = [i for i in range(first + 1, last) if not body[0] <= i < body[1]]
-            if left_out:
-                names = ", ".join(self.names[i] for i in left_out)[:200]
-                self.doubts["extra"] = (
-                    f"the body hangs on {self.names[body[0]]!r}, which moves against "
-                    f"{self.names[first]!r}; what else hangs there is left out: {names}."
-                )
-            first, last = body
-            root = root + (turn @ shifts[first][..., None])[..., 0]
-            turn = turn @ rotations[:, first]
-        return first, last, root, turn
-
-    def _moves(self, joint: int, shifts: dict[int, np.ndarray]) -> bool:
-        return joint in shifts and np.abs(shifts[joint] - self.offsets[joint]).max() > RIGID
-
-    def _carried(self, first: int, last: int, shifts: dict) -> tuple[int, int] | None:
-        """The range of joints of a body that moves against the joint `first`, which carries it
-        alone, or among others: then it is what has both legs and the head, as far as names tell."""
-        children = [i for i in range(first + 1, last) if self.parents[i] == first]
-        bodies = [body for body in pairwise([*children, last]) if self._moves(body[0], shifts)]
-        if not bodies:
-            return None
-        if len(children) == 1 and first not in self.end_parents:
-            return bodies[0]
-        bare = torch.zeros(len(self.names), 3)
-        roles = Skeleton(tuple(self.names), tuple(self.parents), bare).roles
-        parts = ("left_upper_leg", "right_upper_leg", "head" if "head" in roles else "neck")
-        for start, stop in bodies:
-            if all(start < roles.get(part, -1) < stop for part in parts):
-                return start, stop
-        return None
-
-    def _rigid_offsets(self, joints: range, shifts: dict[int, np.ndarray], mean: bool) -> None:
-        """Put joints with position channels where these say, if they keep to one place."""
-        most, worst = RIGID, ""
-        for joint in joints:
-            if joint not in shifts:
-                continue
-            self.offsets[joint] = shifts[joint].mean(0)
-            name = self.names[joint]
-            wobble = np.linalg.norm(shifts[joint] - self.offsets[joint], axis=-1).max()
-            if wobble > RIGID and not mean:
-                raise BvhError(
-                    f"{self.where}, line {self.tree.joints[name]}: joint {name!r} moves against "
-                    f"its parent by up to {wobble * 100:.1f} cm; bones here are rigid: read the "
-                    "file with rigid='mean', which takes the mean offset, or bake the motion to "
-                    "rotations in the program it comes from."
-                )
-            if wobble > most:
-                most, worst = wobble, name
-        if worst:
-            self.doubts["rigid"] = (
-                f"joints slide against their parents, {worst!r} the most; they are put at their "
-                f"mean offset, which moves it by up to {most * 1000:.1f} mm."
-            )
+def _joints(nodes: list[BvhNode], tree: Tree, where, metres: float) -> rigid.Tree:
+    """Joints and end sites of a tree, in metres."""
+    joints = [node for node in nodes if not node.is_end_site()]
+    index = {id(node): i for i, node in enumerate(joints)}
+    # in the order of their joints, so that a clip written and read again keeps its points
+    ends = [(index[id(node.parent)], node.offset) for node in nodes if node.is_end_site()]
+    ends.sort(key=lambda end: end[0])
+    return rigid.Tree(
+        list(tree.joints),
+        [-1 if node.parent is None else index[id(node.parent)] for node in joints],
+        np.array([node.offset for node in joints]) * metres,
+        [parent for parent, _ in ends],
+        np.array([offset for _, offset in ends]).reshape(-1, 3) * metres,
+        lambda name, said: BvhError(f"{where}, line {tree.joints[name]}: {said}"),
+        tree.orders,
+    )
