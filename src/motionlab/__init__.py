@@ -10,7 +10,7 @@ from .skeleton import Skeleton
 from .version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from .io import read_amc, read_bvh, write_bvh, write_gltf
+    from .io import read_amc, read_bvh, read_gltf, write_bvh, write_gltf
     from .viewer import show
     from .weights import load
 
@@ -29,6 +29,7 @@ __all__ = [
     "metrics",
     "read_amc",
     "read_bvh",
+    "read_gltf",
     "show",
     "viewer",
     "write_bvh",
@@ -40,6 +41,7 @@ _FUNCTIONS = {
     "load": ".weights",
     "read_amc": ".io",
     "read_bvh": ".io",
+    "read_gltf": ".io",
     "show": ".viewer",
     "write_bvh": ".io",
     "write_gltf": ".io",

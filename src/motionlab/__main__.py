@@ -154,7 +154,7 @@ class Prepare:
     """Make motion ready for training: one file of features, splits and normaliser."""
 
     source: Positional[Annotated[str, arg(metavar="NAME|FOLDER")]]
-    """Data set, as `data list` names it, or a folder of .bvh and .amc files."""
+    """Data set, as `data list` names it, or a folder of .bvh, .amc and .glb files."""
     permissive: bool = False
     """Leave out clips whose licence forbids commercial use."""
     units: str | None = None

@@ -18,7 +18,7 @@ class AmcError(MotionFileError):
 
 
 class GltfError(MotionFileError):
-    """A glTF file that can't be written."""
+    """A glTF file that can't be read or written; the message names file, fault and remedy."""
 
 
 class SkeletonError(MotionLabError):

@@ -283,7 +283,7 @@ def test_from_folder_of_another_axis_of_several_bodies_of_joints_that_slide(fold
 
 def test_from_folder_that_is_empty_or_absent(tmp_path):
     (tmp_path / "empty").mkdir()
-    with pytest.raises(DataError, match=r"no file ends in \.bvh or \.amc; "):
+    with pytest.raises(DataError, match=r"no file ends in \.bvh, \.amc, \.glb or \.gltf; "):
         datasets.from_folder(tmp_path / "empty")
     with pytest.raises(DataError, match="is not a folder"):
         datasets.from_folder(tmp_path / "absent")

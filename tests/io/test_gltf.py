@@ -12,6 +12,7 @@ import pytest
 import roma
 import torch
 from glb_reader import Glb
+from gltf_files import mixamo
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -306,6 +307,7 @@ def test_khronos_validator_finds_nothing(walk, tmp_path):
     paths = [str(tmp_path / f"{name}.glb") for name in written]
     for path, motion in zip(paths, written.values(), strict=True):
         write_gltf(motion, path)
+    paths.append(str(mixamo(walk).save(tmp_path / "mixamo.glb")))  # which reading is tested with
     bad = tmp_path / "bad.glb"  # so that silence means something
     bad.write_bytes(Path(paths[0]).read_bytes().replace(b'"VEC4"', b'"VEC3"', 1))
     run = nodejs.node(

@@ -14,7 +14,7 @@ from tyro.conf import Positional, arg
 from ..errors import MotionFileError, MotionLabError
 from ..io.bvh_reading import Reading
 from ..io.bvh_units import foot_to_head
-from ..io.motion_file import SUFFIXES, is_motion, read_motion
+from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..roles import ALL, read
 
 if TYPE_CHECKING:
@@ -24,25 +24,27 @@ if TYPE_CHECKING:
 
 @dataclass
 class Info:
-    """What is in a motion file, BVH or Acclaim, and which joint is understood as what; a line a file for a folder."""
+    """What is in a motion file and which joint is understood as what; a line a file for a folder."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
-    """A .bvh or .amc file, or a folder of them."""
+    """A .bvh, .amc, .glb or .gltf file, or a folder of them."""
     roles: Annotated[Path | None, arg(metavar="TABLE")] = None
     """TOML or JSON file that says which joint is which, as this command prints it."""
     units: float | str | None = None
-    """The file's unit: m, dm, cm, mm, in, ft, or metres per unit; if not said, cm for BVH."""
+    """The file's unit: m, dm, cm, mm, in, ft, or metres per unit; if not said, cm for BVH, m for glTF."""
     up: str | None = None
     """The file's axis that points up: y, z, x, or with a minus, as --up=-z."""
     root: str | None = None
-    """Name of the ROOT to read, of a file that holds several bodies."""
+    """Name of the ROOT, or node, to begin with, of a file that holds several bodies."""
     rigid: str | None = None
     """mean: put joints that slide against their parents at their mean offset."""
+    animation: str | None = None
+    """Name or number of the animation to read, of a glTF file that holds several."""
 
     def run(self) -> None:
         given = None if self.roles is None else read(self.roles)
-        reading = {"units": self.units, "up": self.up, "root": self.root, "rigid": self.rigid}
-        print(describe(self.path, roles=given, **reading))
+        names = ("units", "up", "root", "rigid", "animation")
+        print(describe(self.path, roles=given, **{name: getattr(self, name) for name in names}))
 
 
 def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None, **reading) -> str:
@@ -68,9 +70,7 @@ def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None,
         return "\n".join([*_sizes(motion, doubts), "#", *_table(motion.skeleton)])
     files = sorted(file for file in path.rglob("*") if is_motion(file))
     if not files:
-        raise MotionFileError(
-            f"{path}: holds no {' or '.join(SUFFIXES)} file; name one, or a folder of them."
-        )
+        raise MotionFileError(f"{path}: holds no {ENDINGS} file; name one, or a folder of them.")
     return "\n".join(_line(file, file.relative_to(path), roles, reading) for file in files)
 
 

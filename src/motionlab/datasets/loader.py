@@ -17,7 +17,7 @@ from tqdm import tqdm
 from ..errors import DataError, MotionFileError, MotionLabError
 from ..io.bvh import parse_bvh
 from ..io.bvh_reading import Reading
-from ..io.motion_file import SUFFIXES, is_motion, read_motion
+from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..motion import Motion
 from . import cache, files, locomotion
 from .registry import (
@@ -177,21 +177,24 @@ def from_folder(
     root: str | None = None,
     rigid: str | None = None,
     roles: Mapping[str, str] | None = None,
+    animation: str | int | None = None,
     pattern: str | None = None,
     tpose_first: bool = False,
     drop_zeros: bool = False,
     split: str | None = None,
     skip_bad: bool = False,
 ) -> list[Motion]:
-    """All motion files of a folder and its subfolders, BVH and Acclaim: a reader's own clips.
+    """All motion files of a folder and its subfolders, BVH, Acclaim, glTF: a reader's own clips.
 
     Parameters
     ----------
     path : the folder.
-    units, up, fps, root, rigid, roles, tpose_first, drop_zeros : as for `motionlab.read_bvh` and
-        `motionlab.read_amc`, for all files alike; units None is centimetres for BVH, for Acclaim
-        what its skeleton says. What is doubtful about files, such as their units, is said once, with their number.
-    pattern : which files, as for `pathlib.Path.glob`; None takes all that end in .bvh or .amc.
+    units, up, fps, root, rigid, roles, animation, tpose_first, drop_zeros : as for
+        `motionlab.read_bvh`, `read_amc` and `read_gltf`, for all files alike; units None is
+        centimetres for BVH, metres for glTF, for Acclaim what its skeleton says. What is doubtful
+        about files, such as their units, is said once, with their number.
+    pattern : which files, as for `pathlib.Path.glob`; None takes all that end in .bvh, .amc, .glb
+        or .gltf.
     split : only the files of this split; which are in it depends on the files' names alone.
     skip_bad : leave out files that can't be read, with a warning, instead of raising.
 
@@ -207,7 +210,8 @@ def from_folder(
     """
     found = read_folder(
         path, pattern=pattern, split=split, skip_bad=skip_bad, units=units, up=up, fps=fps,
-        root=root, rigid=rigid, roles=roles, tpose_first=tpose_first, drop_zeros=drop_zeros,
+        root=root, rigid=rigid, roles=roles, animation=animation, tpose_first=tpose_first,
+        drop_zeros=drop_zeros,
     )  # fmt: skip
     return [motion for _, motion in found]
 
@@ -276,7 +280,7 @@ def _find(
             f"{folder}: {pattern!r} is no pattern below the folder; write one like '**/*.bvh'."
         ) from error
     if not found:
-        sought = f"matches {pattern!r}" if pattern else f"ends in {' or '.join(SUFFIXES)}"
+        sought = f"matches {pattern!r}" if pattern else f"ends in {ENDINGS}"
         raise DataError(
             f"{folder}: no file {sought}; put motion files there, or give another pattern."
         )

@@ -13,7 +13,7 @@ _POSSIBLE = (1e-6, 5.0)
 _USUAL = (0.001, 1.0)
 _UNITS = r"(.*?) ?(s|sec|secs|second|seconds|(?P<ms>ms|msec|msecs|milliseconds)|(?P<fps>fps|hz))?"
 # At which people record and exporters write.
-_RATES = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 180, 200, 240, 250, 300)
+RATES = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 180, 200, 240, 250, 300)
 _DIGITS = 0.03  # a rate is recognised within this share of it: 33 ms are 30.3 frames per second
 
 
@@ -42,10 +42,11 @@ def rate_of(layout: Layout) -> tuple[float, str | None]:
             f"line {number}: a frame time of {seconds:g} s is {1 / seconds:.4g} frames per "
             f"second{what}; if that is not so, read the file with {then}."
         )
-    return _whole(1 / seconds), doubt
+    return whole(1 / seconds), doubt
 
 
-def _whole(rate: float) -> float:
+def whole(rate: float) -> float:
+    """A rate without what was rounded in its file."""
     whole = round(rate)
     return float(whole) if abs(rate - whole) < 1e-4 * rate else round(rate, 6)
 
@@ -64,5 +65,5 @@ def _meant(value: float) -> tuple[str, str]:
 
 def _near(rate: float) -> float | None:
     """The usual rate that is meant by one."""
-    nearest = min(_RATES, key=lambda usual: abs(usual - rate))
+    nearest = min(RATES, key=lambda usual: abs(usual - rate))
     return nearest if abs(nearest - rate) < _DIGITS * nearest else None

@@ -29,9 +29,11 @@ Doubts = dict[str, str]
 
 @dataclass(frozen=True)
 class Reading:
-    """How files are read: the arguments of `read_bvh`, checked before any file is opened.
+    """How files are read: the arguments of `read_bvh` and of the other readers, checked before any
+    file is opened.
 
-    Of a BVH file units None is "cm"; an Acclaim skeleton says its own.
+    Of a BVH file units None is "cm", of glTF "m"; an Acclaim skeleton says its own. Files of other
+    kinds than glTF hold one animation.
     """
 
     units: str | float | None = None
@@ -42,6 +44,7 @@ class Reading:
     root: str | None = None
     rigid: str | None = None
     roles: Mapping[str, str] | None = None
+    animation: str | int | None = None
 
     def __post_init__(self) -> None:
         if self.units is not None:

@@ -1,8 +1,9 @@
-"""Motion as binary glTF 2.0, for Blender, game engines, three.js and the viewers of many systems.
+"""Motion as glTF 2.0, from and for Blender, game engines, three.js and the viewers of many systems.
 
-One ``.glb`` file holds the skeleton (a node per joint and end site), the animation, and a mannequin
-that the joints carry, so that there is something to see. glTF's world is ours: metres, seconds, y
-up, z ahead, right-handed. The format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
+The ``.glb`` file that is written holds the skeleton (a node per joint and end site), the animation,
+and a mannequin that the joints carry, so that there is something to see. Read is the skeleton of
+any file that has a skin or an animation. glTF's world is ours: metres, seconds, y up, z ahead,
+right-handed. The format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import json
 import os
 import struct
 import tempfile
+import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -18,16 +21,78 @@ import roma
 import torch
 from torch import Tensor
 
-from ..errors import GltfError
+from ..errors import BvhError, GltfError
 from ..motion import Motion
 from ..version import __version__
+from .bvh_reading import Reading
 from .gltf_mesh import Skin, bind_pose, mannequin
+from .gltf_reading import read
 
 # Codes that glTF took from OpenGL.
 _COMPONENT = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
 _WIDTH = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _VERTICES, _TRIANGLES = {"target": 34962}, {"target": 34963}
 _ROUGHNESS = 0.55  # as in the player
+
+
+def read_gltf(
+    path: str | os.PathLike,
+    *,
+    animation: str | int | None = None,
+    units: str | float = "m",
+    up: str | None = None,
+    fps: float | None = None,
+    root: str | None = None,
+    rigid: str | None = None,
+    tpose_first: bool = False,
+    drop_zeros: bool = False,
+    source: str = "",
+    roles: Mapping[str, str] | None = None,
+) -> Motion:
+    """Read the skeleton and an animation of a glTF file, ``.glb`` or ``.gltf``.
+
+    Parameters
+    ----------
+    path : the file. Others that a ``.gltf`` names must lie in its folder, or below it.
+    animation : the one to read, by name or number from 0; needed where several move the body.
+    units, up : as of `read_bvh`, for files that are not in metres with y up, as glTF asks for.
+    fps : frames per second of the motion. None takes the rate at which the keys come, and 30, with
+        a warning, where they come at none.
+    root : the node to begin with, by its name, of a file that holds several bodies.
+    rigid : "mean" reads joints that slide against their parents, or are moved by a scale that
+        changes, at their mean offset, and says how much that moves them; None refuses them if they
+        slide by more than 1 mm.
+    tpose_first, source, roles : as of `read_bvh`.
+    drop_zeros : leave out leading frames in which every joint is turned as at rest.
+
+    Joints are the nodes that carry a skin, what the animation moves below them, and what lies
+    between; without skin, the nodes that the animation moves and those between and below them. What
+    hangs on them with nothing to see becomes an end site. What is above, such as an armature's
+    scale and quarter turn, goes into the joints' places. Offsets and rotations are the nodes' own,
+    as bones are drawn there: the rest pose, all rotations zero, need not be a person's. A root that
+    does nothing but carry the body is folded into it, as in `read_bvh`. Two nodes of one name are
+    Hips and Hips.001. Meshes, morph targets and cameras are left out. A rig without animation makes
+    one frame, the pose at rest, with a warning.
+
+    Between keys rotations go along the shorter arc, all else in lines, or as the file says, in
+    steps or cubic splines.
+
+    Returns
+    -------
+    Motion : metres, y up, from the first key to the last.
+
+    Raises
+    ------
+    GltfError : the file can't be read; the message names file, fault and remedy.
+    """
+    try:
+        how = Reading(units, fps, tpose_first, drop_zeros, up, root, rigid, roles, animation)
+    except BvhError as error:
+        raise GltfError(str(error)) from error
+    motion, doubts = read(path, how, source)
+    for said in doubts.values():
+        warnings.warn(f"{path}: {said}", stacklevel=2)
+    return motion
 
 
 def write_gltf(

@@ -6,11 +6,17 @@ import os
 from pathlib import Path
 
 from ..motion import Motion
-from . import acclaim, bvh_reading
+from . import acclaim, bvh_reading, gltf_reading
 from .bvh_reading import Doubts, Reading
 
-_READERS = {".bvh": bvh_reading.read, ".amc": acclaim.read}
+_READERS = {
+    ".bvh": bvh_reading.read,
+    ".amc": acclaim.read,
+    ".glb": gltf_reading.read,
+    ".gltf": gltf_reading.read,
+}
 SUFFIXES = tuple(_READERS)
+ENDINGS = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"  # in words
 
 
 def is_motion(path: Path) -> bool:
