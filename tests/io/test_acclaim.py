@@ -253,7 +253,8 @@ def test_units_up_and_roles_can_be_said():
     )
     named = parse(AMC, roles={"spine": "upperback"}).skeleton
     assert named.role("spine") == named.index("upperback") != plain.skeleton.role("spine")
-    lying = parse(AMC, up="-z")
+    with pytest.warns(UserWarning, match="read it with up='y'"):
+        lying = parse(AMC, up="-z")
     torch.testing.assert_close(lying.positions()[..., 1], -plain.positions()[..., 2])
 
 

@@ -127,6 +127,33 @@ def test_what_is_no_axis(up, tmp_path):
         read_bvh(tmp_path / "need_not_be_there.bvh", up=up)
 
 
+# -- said wrongly ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("true", TURNED)
+@pytest.mark.parametrize("said", OTHER)
+def test_a_wrong_axis_is_told_with_the_right_one(true, said, tmp_path):
+    write_bvh(in_file(walk(), true), tmp_path / "clip.bvh")
+    if said == true:
+        read_bvh(tmp_path / "clip.bvh", up=said)
+        return
+    with pytest.warns(UserWarning) as caught:
+        read_bvh(tmp_path / "clip.bvh", up=said)
+    (text,) = [str(warning.message) for warning in caught]
+    assert text.startswith(f"{tmp_path / 'clip.bvh'}: read with up={said!r} ")
+    assert f"read it with up={true!r}" in text
+
+
+def test_who_crawls_about_in_a_file_of_another_axis_is_no_wrong_axis(tmp_path):
+    """The trunk lies, but along no axis for long."""
+    motion = gaits.make(seconds=3.4, speed=0)[:100]
+    rotations = motion.rotations.clone()
+    yaw = yaw_matrix(torch.linspace(0, 6, 100))
+    rotations[:, 0] = yaw @ matrix("z").T @ rotations[:, 0]
+    write_bvh(in_file(replace(motion, rotations=rotations), "z"), tmp_path / "clip.bvh")
+    read_bvh(tmp_path / "clip.bvh", up="z")
+
+
 # -- nobody says so -------------------------------------------------------------------------------
 
 

@@ -55,8 +55,7 @@ def read_amc(
         warns.
     units : the files' unit of length, as for `read_bvh`. None takes what the skeleton says: inches
         divided by its ``length``, which for CMU's is 5.6444 cm.
-    up : the files' axis that points up, as for `read_bvh`; None takes y and warns of a trunk that
-        is hardly ever upright.
+    up : the files' axis that points up, as for `read_bvh`.
     rigid : "mean" leaves out what stretches or shifts bones, and says how much that is; None
         refuses it if it is more than 1 mm.
     tpose_first, drop_zeros, source, roles : as for `read_bvh`.
@@ -182,7 +181,7 @@ def _parse(
     )
     motion = turn_up(motion, how.up)
     said = {"units": doubt_units(motion.skeleton, float(f"{metres:.6g}"))}
-    said["up"] = doubt_up(motion) if how.up is None else None
+    said["up"] = doubt_up(motion, how.up)
     return motion, doubts | {about: text for about, text in said.items() if text}
 
 

@@ -47,8 +47,8 @@ def read_bvh(
     units : the file's unit of length, one of "m", "dm", "cm", "mm", "in", "ft", or metres per unit.
         BVH does not say, most exporters write centimetres.
     up : the file's axis that points up, one of "y", "-y", "z", "-z", "x", "-x". World and rest pose
-        are turned so that y is up; of z-up, x, y, z become x, z, -y. None takes y, and warns of a
-        trunk that is hardly ever upright.
+        are turned so that y is up; of z-up, x, y, z become x, z, -y. None takes y. A trunk that is
+        hardly ever upright then is warned of, unless "y" is said.
     fps : frames per second, for a file whose own frame time is wrong.
     root : the ROOT to read, by its name, of a file that holds several bodies.
     rigid : "mean" reads joints that slide against their parents, at their mean offset, and says how

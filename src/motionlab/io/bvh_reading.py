@@ -90,7 +90,7 @@ def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, D
     motion = turn_up(_with_roles(motion, how, where), how.up)  # which asks where the trunk is
     doubts |= body.doubts
     doubts["units"] = doubt_units(motion.skeleton, units)
-    doubts["up"] = doubt_up(motion) if how.up is None else None
+    doubts["up"] = doubt_up(motion, how.up)
     return motion, {about: said for about, said in doubts.items() if said}
 
 

@@ -25,6 +25,7 @@ _TURNS = {
 }
 _UPRIGHT = 0.7  # of a unit vector along the trunk, what must point up
 _SHARE = 0.05  # of the frames; with fewer upright ones, it is not a person who lies down for once
+_MOST = 0.5  # of the frames; upright people are so in more
 _LOOKED_AT = 64  # frames, spread over the clip: enough to tell, and no time
 
 
@@ -69,17 +70,31 @@ def turn_up(motion: Motion, up: str | None) -> Motion:
     )
 
 
-def doubt_up(motion: Motion) -> str | None:
-    """What to say if the trunk, as far as the joints' roles tell it, is hardly ever upright."""
+def doubt_up(motion: Motion, up: str | None = None) -> str | None:
+    """What to say if the trunk, as far as the joints' roles tell it, is hardly ever upright.
+
+    motion : turned; up : the file's axis that was said to point up. "y" is how to say that a person
+    lies, crawls or stands on the hands, so of that nothing is said.
+    """
     some = motion.rotations[:: -(-len(motion) // _LOOKED_AT)]
-    trunk = _trunk(motion.skeleton, some)
+    trunk = None if up == "y" else _trunk(motion.skeleton, some)
     if trunk is None or (trunk[:, 1] > _UPRIGHT).float().mean() >= _SHARE:
         return None
+    trunk = trunk @ torch.tensor(_TURNS[up or "y"], dtype=torch.float32)  # in the file's axes
     mean = trunk.mean(0)
     axis = int(mean.abs().argmax())
-    name = "-" * bool(mean[axis] < 0) + "xyz"[axis]
-    if name == "y":  # leaning, this way and that
+    sign = -1.0 if mean[axis] < 0 else 1.0
+    name = "-" * (sign < 0) + "xyz"[axis]
+    if name == (up or "y"):  # leaning, this way and that
         return None
+    if up is not None:
+        if (sign * trunk[:, axis] > _UPRIGHT).float().mean() < _MOST:
+            return None
+        return (
+            f"read with up={up!r} the body's trunk is upright in hardly any frame; it points along the "
+            f"file's {name}: if that is up, read it with up={name!r}. Of a person who lies, crawls or "
+            "stands on the hands it may be right."
+        )
     return (
         f"the body's trunk points along {name} and is upright (along y) in hardly any frame; if "
         f"{name} is up in this file, read it with up={name!r}, if the person lies, crawls or "
