@@ -11,9 +11,10 @@ import torch
 from torch import nn
 
 import motionlab
-from motionlab import MotionLabError, datasets, weights
+from motionlab import MotionLabError, weights
 from motionlab.training import GAMES, PRESETS, Prepared
 from motionlab.training.games import GamePreset
+from motionlab.training.licence import in_words, licence
 
 from ..common import record
 
@@ -87,8 +88,6 @@ def card(
     size: int,
     clips: int,
     minutes: float,
-    sources: str,
-    commercial: bool,
     remark: str = "",
 ) -> str:
     """A generator's card, in Markdown; clips, minutes: of training motion; remark: on its limits."""
@@ -135,11 +134,13 @@ apart.
 
 {LIMITS[kind].format(name=name)}{remark and f" {remark}"}
 
-{_licence(sources, commercial)}
+## Licence
+
+{in_words(about["licence"])}
 """
 
 
-def refiner_card(about: dict, model: nn.Module, size: int, sources: str, commercial: bool) -> str:
+def refiner_card(about: dict, model: nn.Module, size: int) -> str:
     """A refiner's card, in Markdown."""
     name, generator = about["name"], about["generator"]
     return f"""\
@@ -180,7 +181,9 @@ motion of other generators, which it has not seen.
 It looks at what has been, not at what comes, and corrects by centimetres: feet still slide, by less.
 `motionlab sample --lock-feet` holds them. It knows level ground, and no other body than the canonical one.
 
-{_licence(sources, commercial)}
+## Licence
+
+{in_words(about["licence"])}
 """
 
 
@@ -204,16 +207,6 @@ def _settings(about: dict) -> str:
 ```json
 {json.dumps(about["preset"], indent=1)}
 ```"""
-
-
-def _licence(sources: str, commercial: bool) -> str:
-    return f"""\
-## Licence
-
-{"The licences of its data allow commercial use." if commercial else "Not for commercial use: some of its data are not."}
-Who passes these weights on names the sources:
-
-{sources}"""
 
 
 def _held_out(about: dict) -> str:
@@ -251,18 +244,11 @@ On validation clips and samples of 10 s that go on from them:
 Half of the roots end within {100 * half["root (m)"]:.1f} cm of where they would have after 10 s."""
 
 
-def licences(data: Prepared) -> tuple[str, bool]:
-    """The sources of the training clips, and whether all may be used commercially."""
-    frames: dict[str, int] = {}
-    rows = zip(data.names, data.splits, data.lengths.tolist(), strict=True)
-    for name, split, length in rows:
-        if split == "train":
-            source = name.split("/")[0]
-            frames[source] = frames.get(source, 0) + length
-    about = {source: datasets.info(source) for source in frames}
-    lines = [
-        f"* {about[source].title} (`{source}`), {100 * count / sum(frames.values()):.1f} % of the "
-        f"frames: {about[source].licence}. {about[source].citation}"
-        for source, count in sorted(frames.items(), key=lambda item: -item[1])
-    ]
-    return "\n".join(lines), all(info.commercial for info in about.values())
+def licence_of(made: dict, data: Prepared) -> dict:
+    """Of what a training made, as `motionlab.training.licence` has it; all of it must be known."""
+    found = made.get("licence") or licence(data)
+    if found["own"]:
+        raise MotionLabError(
+            "Some of the data are of no named data set; their licence is not known."
+        )
+    return found

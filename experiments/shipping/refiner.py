@@ -16,7 +16,7 @@ from motionlab.training.checkpoints import save_weights, write_whole
 from motionlab.training.judging import Judge
 
 from ..common import record
-from .cards import command_of_game, licences, refiner_card
+from .cards import command_of_game, licence_of, refiner_card
 from .weights import FOLDER, rounded, with_data
 
 
@@ -37,18 +37,18 @@ def ship(name: str, file: Path, generator: str | None, source: str, folder: Path
     data, refiner, made = with_data(file, source)
     of = generator or made["name"].replace("refiner", "lstm-gmm")
     model = motionlab.load(of)
-    sources, commercial = licences(data)  # of an unknown source: fails before anything is written
+    licence = licence_of(made, data)  # if it is not known, fails before anything is written
     halved, judge = rounded(refiner), Judge(model, data)
     told = {"full": judge(refiner.eval()), "half": judge(halved)}
     about = {
         **{key: made[key] for key in ("preset", "data", "step", "seconds")},
         "name": name, "model": made["name"], "generator": of, "generator_hash": model.hash,
-        "command": command_of_game(made, of), "data_name": source, "judged": told,
+        "command": command_of_game(made, of), "data_name": source, "judged": told, "licence": licence,
         "unrefined": judge.unrefined, "real": judge.real,
     }  # fmt: skip
     path = folder / f"{name}.safetensors"
     save_weights(path, halved, about, half=True)
-    text = refiner_card(about, halved, path.stat().st_size, sources, commercial)
+    text = refiner_card(about, halved, path.stat().st_size)
     write_whole(path.with_suffix(".md"), lambda stream: stream.write(text.encode()))
     return path
 

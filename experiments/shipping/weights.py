@@ -24,10 +24,10 @@ from motionlab.training import PRESETS, Prepared
 from motionlab.training.checkpoints import load_weights, save_weights, write_whole
 from motionlab.training.evaluation import likelihood
 from motionlab.training.finish import fit_temperature
+from motionlab.training.starts import before_starts
 
 from ..common import record
-from .cards import card, command_of, licences
-from .starts import OBSERVED, candidates, choose, of_dances
+from .cards import card, command_of, licence_of
 
 FOLDER = Path(motionlab.__file__).parent / "weights"
 
@@ -59,7 +59,7 @@ def ship(
 ) -> Path:
     """Write NAME.safetensors and NAME.md; returns the path of the weights."""
     data, model, made = with_data(file, source)
-    licence = licences(data)  # of an unknown source: fails before anything is written
+    licence = licence_of(made, data)  # if it is not known, fails before anything is written
     halved = rounded(model)
     ready = mixture if isinstance(model, LstmGmm) else dancer
     before, starts, sampling, facts = ready(model, halved, data, made, sampling)
@@ -69,6 +69,7 @@ def ship(
     about = {
         **{key: made[key] for key in ("preset", "data", "precision", "update", "seconds")},
         "start": made.get("start"),
+        "licence": licence,
         "name": name,
         "model": made["name"],
         "command": command_of(made, source),
@@ -81,7 +82,7 @@ def ship(
     save_weights(path, halved, about, starts=state, half=True)
     clips = data.clips("train")
     minutes = sum(map(len, clips)) / data.encoding.fps / 60
-    text = card(about, halved, path.stat().st_size, len(clips), minutes, *licence, remark)
+    text = card(about, halved, path.stat().st_size, len(clips), minutes, remark)
     write_whole(path.with_suffix(".md"), lambda stream: stream.write(text.encode()))
     return path
 
@@ -110,14 +111,14 @@ def mixture(
     model: nn.Module, halved: nn.Module, data: Prepared, made: dict, sampling: dict
 ) -> Ready:
     """Frames before each start (starts, frames, dim), names, sampling, and what else to know."""
-    clips = data.matching(model.encoding).clips("val")
+    data = data.matching(model.encoding)
+    clips = data.clips("val")
     if "temperature" not in sampling:
         sampling = {"temperature": fit_temperature(halved, clips, **sampling)} | sampling
-    starts, observed = choose(candidates(data)), round(OBSERVED * model.fps)
-    before = torch.stack([clips[s.clip][s.frame - observed : s.frame] for s in starts])
+    before, names = before_starts(data, model.fps)
     nats = {"full": likelihood(model, clips), "half": likelihood(halved, clips)}
     facts = {"log_likelihood": {kind: found._asdict() for kind, found in nats.items()}}
-    return before, [start.name for start in starts], sampling, facts
+    return before, names, sampling, facts
 
 
 @torch.no_grad()
@@ -132,7 +133,7 @@ def dancer(
         "full": model.loss(windows, **extras).item(),
         "half": halved.loss(windows, **extras).item(),
     }
-    before, names = of_dances(data, model.fps)
+    before, names = before_starts(data, model.fps)
     return before, names, sampling, {"validation loss": loss}
 
 

@@ -77,7 +77,8 @@ def test_golden_curve(train, smoke, tmp_path):
     clips = [encoding.encode(motion) for some in motions.values() for motion in some]
     splits = [split for split, some in motions.items() for _ in some]
     lengths, normalizer = torch.tensor([len(c) for c in clips]), Normalizer.fit(clips[:32])
-    data = Prepared(torch.cat(clips), lengths, (), tuple(splits), encoding, normalizer, "golden")
+    names = tuple(f"gaits/{motion.name}" for some in motions.values() for motion in some)
+    data = Prepared(torch.cat(clips), lengths, names, tuple(splits), encoding, normalizer, "golden")
     curve = train(tmp_path, smoke(), data=data)
     assert {point["update"]: point["val"] for point in curve} == pytest.approx(GOLDEN, abs=0.02)
     assert json.loads((tmp_path / "curve.json").read_text()) == curve

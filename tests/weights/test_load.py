@@ -11,12 +11,12 @@ from safetensors.torch import save_file
 
 import motionlab
 from experiments.shipping import cards
-from experiments.shipping.starts import candidates, choose
 from experiments.shipping.weights import ship
 from motionlab import contacts, metrics, weights
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import LstmGmm
 from motionlab.training.checkpoints import load_weights, save_weights
+from motionlab.training.starts import candidates, choose
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +158,7 @@ def test_card_says_what_a_training_began_with(model, shipped, monkeypatch):
     assert " --from WEIGHTS --updates 60" in cards.command_of(made, "gaits")
     monkeypatch.setattr(weights, "_FOLDER", shipped.parent)
     assert " --from tiny --updates 60" in cards.command_of(made, "gaits")
-    card = cards.card({**model.about, "start": model.hash}, model, 9, 9, 1.0, "", True)
+    card = cards.card({**model.about, "start": model.hash}, model, 9, 9, 1.0)
     assert f"| began with | weights of sha256 {model.hash} |" in card
 
 
@@ -206,17 +206,6 @@ def test_a_dancer_ships_with_starts_and_a_card(tmp_path):
     for said in ("# aclstm-tiny\n", "Zhou and others", f"held-out loss | {half:.4f}", "MIT",
                  "motionlab train aclstm-indian --preset smoke"):  # fmt: skip
         assert said in model.card, said
-
-
-def test_starts_are_named_after_what_follows(gaits):
-    names = [name for name, split in zip(gaits.data.names, gaits.data.splits, strict=True)
-             if split == "val"]  # fmt: skip
-    found = candidates(gaits.data)
-    assert {start.clip for start in found} == set(range(len(names)))
-    for start in found:
-        gait = names[start.clip].split("/")[1].split("_")[0]
-        # who goes and halts walks or stands
-        assert start.gait == gait or (gait == "go" and start.gait in ("walk", "stand")), start
 
 
 REFINERS = [name for name in weights.names() if name.startswith("refiner")]

@@ -85,17 +85,19 @@ class Train:
         )  # fmt: skip
         if torch.distributed.is_initialized() and torch.distributed.get_rank():
             return  # one process is enough for what is left
-        sampling = finish(out / preset.weights, data, preset)
+        sampling = finish(out / preset.weights, data)
         best = min(curve, key=lambda point: point["val"])
         print(f"{out}: {curve[-1]['update']} updates; best of validation {best['val']:.3f} at "
               f"update {best['update']}; weights in {preset.weights}"
-              + "".join(f"; {key} {value:g}" for key, value in sampling.items()))  # fmt: skip
+              + "".join(f"; {key} {value:g}" for key, value in sampling.items())
+              + f"; starts and licence in {Path(preset.weights).with_suffix('.md')}")  # fmt: skip
 
     def _play(self, preset: GamePreset, out: Path) -> None:
         from ..training import Prepared
         from ..training.adversarial import train_game
+        from ..training.finish import write_card
         from ..training.judging import Judge, choose
-        from ..weights import load
+        from ..weights import find, load
 
         if self.learning_rate is not None or (self.devices, self.nodes) != (1, 1):
             raise MotionLabError(
@@ -104,14 +106,18 @@ class Train:
             )
         chosen = {"steps": self.updates, "seed": self.seed}
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
-        generator = load(self.start or self.model.replace("refiner", "lstm-gmm"))
+        start = find(self.start or self.model.replace("refiner", "lstm-gmm"))
+        generator = load(start)
         check_generates(generator, self.start or self.model)
         data = Prepared.find(self.data or "locomotion")
         judge = Judge(generator, data)  # says now what it would have to say after the game
         device = None if self.accelerator == "auto" else self.accelerator
-        train_game(generator, data, preset, out, name=self.model, device=device, progress=True)
+        train_game(
+            generator, data, preset, out, name=self.model, start=start, device=device, progress=True
+        )
         print("which refiner is best? this takes some seconds for each", flush=True)
         best = choose(out, judge, preset.weights)
+        write_card(out / preset.weights)
         print(f"{out}: the best is of step {best['step']}; weights in {preset.weights}; foot skate "
               f"{best['foot skate (cm/s)']:.1f} cm/s, jerk {best['jerk (m/s³)']:.0f} m/s³, a "
               f"critic is right in {best['critic']:.0%}, roots moved {100 * best['root (m)']:.1f} cm")  # fmt: skip

@@ -36,6 +36,7 @@ from ..models.refiner import (
 from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
 from .finish import OBSERVED
 from .games import GamePreset
+from .licence import licence
 from .loop import CHECKPOINT
 from .prepared import Prepared
 from .windows import Windows
@@ -82,6 +83,7 @@ def train_game(
     folder: str | os.PathLike,
     *,
     name: str,
+    start: str | os.PathLike | None = None,
     device: str | None = None,
     progress: bool = False,
 ) -> list[dict]:
@@ -94,6 +96,7 @@ def train_game(
     folder : receives ``checkpoint.safetensors`` to go on from, ``curve.json``, and the refiner as
         ``at-STEP.safetensors`` at every validation: which is best, an independent judge says.
     name : of the refiner, kept with its weights.
+    start : file of the generator's weights, whose licence holds for the refiner, too.
     device : "cpu", "cuda"; by default the best there is.
     progress : show a bar and a line for every validation.
 
@@ -120,7 +123,8 @@ def train_game(
     )
     facts = {"name": name, "preset": asdict(preset), "data": data.hash,
              "generator_hash": getattr(generator, "hash", None),  # if it was loaded
-             "model": game.refiner.config(), "step": 0, "seconds": 0.0, "curve": []}  # fmt: skip
+             "model": game.refiner.config(), "step": 0, "seconds": 0.0, "curve": [],
+             "licence": licence(data, start)}  # fmt: skip
     _resume(folder / CHECKPOINT, game, optimizer, facts)
     source = _Source(generator, data, preset, device)
     seen: dict[str, list[float]] = {"telling": [], "fooling": [], "root (cm)": [], "turns": []}

@@ -7,27 +7,29 @@ tremble. Lower temperatures are calmer, and too low ones calmer than people.
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
 from .. import metrics
+from ..errors import TrainingError
 from ..models import LstmGmm
-from .checkpoints import load_weights, save_weights
+from .checkpoints import load_weights, save_weights, write_whole
+from .licence import in_words
 from .prepared import Prepared
-from .presets import Preset
+from .starts import before_starts
 
 OBSERVED = 2.0  # seconds of real motion that a network sees before it goes on by itself
 LEAST, MOST, HALVINGS = 0.1, 1.0, 6  # known to 0.014 then
-STARTS = 8
 
 
 @torch.no_grad()
-def finish(path: str | os.PathLike, data: Prepared, preset: Preset) -> dict[str, float]:
+def finish(path: str | os.PathLike, data: Prepared) -> dict[str, float]:
     """Add to a training's weights what `motionlab.load` gives with them; what it samples with.
 
-    Starts are validation windows, spread evenly. A mixture also gets the temperature at which its
-    motion is as lively as those clips.
+    Starts are moments of validation clips. A mixture also gets the temperature at which its motion
+    is as lively as those clips. What the weights are is told in a card beside them.
 
     Raises
     ------
@@ -35,16 +37,39 @@ def finish(path: str | os.PathLike, data: Prepared, preset: Preset) -> dict[str,
     """
     model, about = load_weights(path)
     model.eval()
-    windows = torch.cat(preset.windows(data, "val").tiles(64))
-    windows = windows[torch.linspace(0, len(windows) - 1, min(STARTS, len(windows))).long()]
-    state = model.observe(windows[:, : round(OBSERVED * model.fps)])
+    before, names = before_starts(data, model.fps)
     sampling = {}
     clips = [clip for clip in data.clips("val") if len(clip) >= OBSERVED * model.fps]
     if isinstance(model, LstmGmm) and clips:
         sampling["temperature"] = fit_temperature(model, clips, seconds=10.0)
-    names = [f"validation {number + 1}" for number in range(len(windows))]
-    save_weights(path, model, about | {"starts": names, "sampling": sampling}, starts=state)
+    about |= {"starts": names, "sampling": sampling}
+    save_weights(path, model, about, starts=model.observe(before))
+    write_card(path)
     return sampling
+
+
+def write_card(path: str | os.PathLike) -> None:
+    """What weights of a training are and what may be done with them, in Markdown beside them.
+
+    Raises
+    ------
+    TrainingError : the weights are missing or damaged, or it can't be written.
+    """
+    card = Path(path).with_suffix(".md")
+    _, about = load_weights(path)
+    lines = [
+        f"# {about['name']}",
+        f"Weights that `motionlab train {about['name']}` left, of data of sha256 {about['data']}.",
+        "## Starts" if "starts" in about else "",
+        "\n".join(f"* {name}" for name in about.get("starts", ())),
+        "## Licence",
+        in_words(about["licence"]),
+    ]
+    text = "\n\n".join(filter(None, lines)) + "\n"
+    try:
+        write_whole(card, lambda stream: stream.write(text.encode()))
+    except OSError as error:
+        raise TrainingError(f"{card}: can't be written ({error.strerror}).") from error
 
 
 @torch.no_grad()

@@ -23,6 +23,7 @@ from tqdm import tqdm
 
 from ..errors import DivergedError, TrainingError
 from .checkpoints import read_checkpoint, restore, save_checkpoint, save_weights, write_whole
+from .licence import licence
 from .prepared import Prepared
 from .presets import LAST, Preset
 from .windows import Windows
@@ -62,7 +63,7 @@ def train(
         at every validation, and ``at-UPDATE.safetensors`` where the preset asks for snapshots.
     name : of the model, kept with its weights.
     start : file of the weights that the model begins with, as `build` was given it; None if it
-        begins anew. Its sha256 is kept with the weights.
+        begins anew. Its sha256 is kept with the weights, and so is its licence beside the data's.
     accelerator, devices, nodes, precision : as for Lightning Fabric; by default one device, the
         best there is, in bfloat16 on a GPU and in float32 elsewhere.
     progress : show a bar and a line for every validation.
@@ -99,7 +100,7 @@ def train(
     facts = {
         "name": name, "model": model.config(), "preset": asdict(preset), "data": data.hash,
         "precision": precision, "start": start and _sha256(start), "update": 0, "seconds": 0.0,
-        "curve": [],
+        "curve": [], "licence": licence(data, start),
     }  # fmt: skip
     _resume(fabric, Path(folder), model, optimizer, facts, preset)
 

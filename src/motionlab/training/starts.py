@@ -1,4 +1,4 @@
-"""Moments to start from, for weights that ship: of the validation clips, each with a name."""
+"""Moments to start from, of the validation clips: each named by what follows it, or by its clip."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from motionlab import MotionLabError, contacts
-from motionlab.training import Prepared
-from motionlab.training.dances import DanceWindows
+from ..encodings import RootRelative
+from ..errors import TrainingError
+from ..feet import contacts
+from .dances import DanceWindows
+from .prepared import Prepared
 
 OBSERVED = 1.0  # seconds that the network sees before a start
 AFTER = 1.0  # seconds that the start is named after
@@ -30,6 +32,7 @@ WANTED = (
     ("sidestep right", 0, (0.5,)),
 )
 TURNS = {-1: ", turn right", 0: "", 1: ", turn left"}
+MOST = 12  # of starts that are named by their clips
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,25 @@ class Start:
     def name(self) -> str:
         speed = "" if self.gait == "stand" else f" {self.speed:.1f} m/s"
         return f"{self.gait}{speed}{TURNS[self.turn]}"
+
+
+def before_starts(data: Prepared, fps: float) -> tuple[Tensor, list[str]]:
+    """What a network sees before it goes on: a second (starts, frames, dim) each, and names.
+
+    data : as the network has them; fps : its frames a second, fewer than those of data of dances.
+
+    Raises
+    ------
+    TrainingError : there is no validation clip to start from.
+    """
+    if isinstance(data.encoding, RootRelative):
+        return of_dances(data, fps)
+    chosen, seen = choose(candidates(data)), round(OBSERVED * fps)
+    if not chosen:
+        return of_clips(data, seen)
+    clips = data.clips("val")
+    before = torch.stack([clips[s.clip][s.frame - seen : s.frame] for s in chosen])
+    return before, [start.name for start in chosen]
 
 
 def candidates(data: Prepared) -> list[Start]:
@@ -79,26 +101,33 @@ def doing(steps: list[float], down: Tensor) -> tuple[str, int, float]:
 
 
 def choose(found: list[Start]) -> list[Start]:
-    """The starts that are wanted, as far as there are any, each of another clip."""
+    """The starts that are wanted, as far as there are any, each of another clip if there is one."""
     chosen: list[Start] = []
     for gait, turn, quantiles in WANTED:
         alike = [start for start in found if (start.gait, start.turn) == (gait, turn)]
         for quantile in quantiles:
-            alike = [
-                start for start in alike
-                if start.clip not in {other.clip for other in chosen}
-                and start.name not in {other.name for other in chosen}
-            ]  # fmt: skip
-            if alike:
-                speeds = torch.tensor([start.speed for start in alike], dtype=torch.float64)
+            alike = [start for start in alike if start.name not in {s.name for s in chosen}]
+            unseen = [start for start in alike if start.clip not in {s.clip for s in chosen}]
+            if some := unseen or alike:
+                speeds = torch.tensor([start.speed for start in some], dtype=torch.float64)
                 nearest = (speeds - speeds.quantile(quantile)).abs().argmin()
-                chosen.append(alike[nearest])
-    if not chosen:
-        raise MotionLabError("The validation clips hold nothing to start from.")
+                chosen.append(some[nearest])
     return chosen
 
 
-def of_dances(data: Prepared, fps: float, most: int = 12) -> tuple[Tensor, list[str]]:
+def of_clips(data: Prepared, seen: int) -> tuple[Tensor, list[str]]:
+    """The first frames (starts, at most `seen`, dim) of clips, where what follows has no name."""
+    rows = zip(data.names, data.splits, data.features.split(data.lengths.tolist()), strict=True)
+    clips = {_title(name): clip for name, split, clip in rows if split == "val"}
+    if not clips:
+        raise TrainingError("There are no validation clips to start from.")
+    seen = min(seen, max(map(len, clips.values())))
+    clips = {name: clip[:seen] for name, clip in clips.items() if len(clip) >= seen}
+    names = _spread(list(clips), MOST)
+    return torch.stack([clips[name] for name in names]), names
+
+
+def of_dances(data: Prepared, fps: float) -> tuple[Tensor, list[str]]:
     """A second (starts, frames, dim) of dancing before each start, spread evenly, and names."""
     seen, found = round(OBSERVED * fps), []
     for name, split, clip in zip(
@@ -108,10 +137,20 @@ def of_dances(data: Prepared, fps: float, most: int = 12) -> tuple[Tensor, list[
             continue
         windows = DanceWindows([clip], seen, data.encoding.fps / fps, tempo=0.0, turn=False)
         (windows,) = windows.tiles(10_000)
-        title = name.split("/")[1].removesuffix("_1")
+        title = _title(name).removesuffix("_1/2")
         found += [(window, f"{title}, {i + 1} s") for i, window in enumerate(windows)]
     if not found:
-        raise MotionLabError("The validation clips hold nothing to start from.")
-    chosen = torch.linspace(0, len(found) - 1, min(most, len(found))).round().long().tolist()
-    windows, names = zip(*(found[i] for i in chosen), strict=True)
+        raise TrainingError("The validation clips hold nothing to start from.")
+    windows, names = zip(*_spread(found, MOST), strict=True)
     return torch.stack(windows), list(names)
+
+
+def _title(name: str) -> str:
+    """Of a clip, without its source."""
+    return name.partition("/")[2]
+
+
+def _spread(items: list, most: int) -> list:
+    """At most so many of them, spread evenly."""
+    chosen = torch.linspace(0, len(items) - 1, min(most, len(items))).round().long()
+    return [items[i] for i in chosen.tolist()]
