@@ -6,7 +6,6 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -14,6 +13,7 @@ from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from .commands.evaluate import Evaluate
 from .commands.info import Info
+from .commands.prepare import Prepare
 from .commands.reproduce import Reproduce
 from .commands.sample import Sample
 from .commands.train import Train
@@ -149,48 +149,6 @@ class Version:
               f"{platform.platform()}")  # fmt: skip
 
 
-@dataclass
-class Prepare:
-    """Make motion ready for training: one file of features, splits and normaliser."""
-
-    source: Positional[Annotated[str, arg(metavar="NAME|FOLDER")]]
-    """Data set, as `data list` names it, or a folder of .bvh, .amc and .glb files."""
-    permissive: bool = False
-    """Leave out clips whose licence forbids commercial use."""
-    units: str | None = None
-    """Of a folder's files: m, dm, cm, mm, in, ft, or metres per unit; cm for BVH if left out."""
-    up: str | None = None
-    """Axis that points up in a folder's files: y, z, x, or with a minus, as --up=-z; y if left out,
-    with a warning of bodies that are never upright."""
-    root: str | None = None
-    """Name of the ROOT to read, of a folder's files that hold several bodies."""
-    rigid: str | None = None
-    """mean: put joints that slide against their parents at their mean offset; refused if left out."""
-    roles: Path | None = None
-    """TOML or JSON file that says which joint is which in a folder's files, as `info` prints it."""
-    skip_bad: bool = False
-    """Leave out a folder's files that can't be read or brought to the canonical skeleton."""
-    out: Path | None = None
-    """File to write; runs/NAME.npz, or runs/NAME-permissive.npz, if left out."""
-
-    def run(self) -> None:
-        from . import roles
-        from .training import prepare
-        from .training.prepared import file_of
-
-        out = self.out or file_of(self.source, self.permissive)
-        units = None if self.units is None else _number_or(self.units)
-        reading = {"units": units, "up": self.up, "root": self.root, "rigid": self.rigid,
-                   "skip_bad": self.skip_bad or None}  # fmt: skip
-        if self.roles is not None:
-            reading["roles"] = roles.read(self.roles)
-        reading = {name: value for name, value in reading.items() if value is not None}
-        prepared = prepare(self.source, progress=True, permissive=self.permissive, **reading)
-        prepared.save(out)
-        print(f"{out}: {len(prepared.names)} clips, {len(prepared.features)} frames, "
-              f"hash {prepared.hash[:12]}")  # fmt: skip
-
-
 COMMANDS = (
     Annotated[Data, subcommand("data")]
     | Annotated[Info, subcommand("info")]
@@ -201,13 +159,6 @@ COMMANDS = (
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Version, subcommand("version")]
 )
-
-
-def _number_or(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _confirm() -> None:

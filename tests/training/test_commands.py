@@ -4,6 +4,7 @@ import json
 import re
 
 import pytest
+from other_axes import redrawn
 
 import motionlab
 from motionlab import write_bvh
@@ -104,8 +105,38 @@ def test_a_folder_of_one_clip_is_too_little(here, capsys):
     write_bvh(gaits.make(seconds=2), here / "mine" / "walk.bvh")
     assert main(["train", "lstm-gmm", "--data", "mine"]) == 1
     said = capsys.readouterr().err
-    assert re.search("mine: has (1 clips for training and 0|0 clips for training and .)", said)
-    assert "Give more clips" in said and not (here / "runs").exists()
+    assert "mine: has 1 clips, the longest of 2.0 s" in said and "Give more" in said
+    assert not (here / "runs").exists()
+
+
+def test_one_recording_of_another_rig_fine_tunes_what_ships(here, capsys):
+    """From a folder, with how it is read, to a sample from a start that is called by what it does."""
+    (here / "mine").mkdir()
+    speed = lambda time: 1.3 * (time > 3) * (time < 60)
+    write_bvh(
+        redrawn(gaits.make(seconds=70, speed=speed), 4), here / "mine" / "take.bvh", units="m"
+    )
+    train = ["train", "lstm-gmm-contacts", "--preset", "smoke", "--updates", "2", "--accelerator",
+             "cpu", "--from", "lstm-gmm-contacts", "--data", "mine", "--out", "tuned"]  # fmt: skip
+    with pytest.warns(UserWarning) as caught:
+        assert main([*train, "--units", "m"]) == 0
+    stance, split = sorted((str(w.message) for w in caught), key=lambda said: "by time" in said)
+    assert "learned once, where a person stands: take, " in stance and "split by time" in split
+    model, shipped = (
+        motionlab.load(name) for name in ("tuned/best.safetensors", "lstm-gmm-contacts")
+    )
+    assert len(model.starts.frame) == len(set(model.start_names)) > 1
+    assert all(re.match("(walk|run|stand|backwards|sidestep)", name) for name in model.start_names)
+    for said in (shipped.hash, "`lstm-gmm-contacts`", "Not for commercial use", "(`mine`), 100.0 %",
+                 "CC BY-NC 4.0", model.start_names[0]):  # fmt: skip
+        assert said in model.card, said
+    assert not model.about["licence"]["commercial"]
+    capsys.readouterr()
+    sample = ["sample", "tuned/best.safetensors", "--seconds", "1", "--out", "a.bvh", "--start"]
+    assert main([*sample, "?"]) == 1
+    said = capsys.readouterr().err
+    assert all(name in said for name in model.start_names)
+    assert main([*sample, model.start_names[-1]]) == 0
 
 
 def test_prepare_into_what_cannot_be_written(here, capsys):

@@ -1,11 +1,13 @@
 """Prepared data: what is in them, and that files are whole or refused."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from other_axes import redrawn
 
 from motionlab import Skeleton, datasets, roles, write_bvh
 from motionlab.__main__ import main
@@ -245,3 +247,86 @@ def test_a_folder_of_a_rig_with_names_of_its_own_is_read_by_a_table_of_roles(tmp
     assert main(["prepare", str(folder), *given]) == 1
     said = capsys.readouterr().err
     assert "walk_0.bvh" in said and "no such joint" in said
+
+
+# -- few clips, of any rig ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seconds", [(70,), (40, 45), (35, 4)])
+def test_one_or_two_long_recordings_are_split_by_time(tmp_path, monkeypatch, seconds):
+    monkeypatch.chdir(tmp_path)
+    whole = [made.make(seconds=s, speed=1.3, seed=s) for s in seconds]
+    for motion, s in zip(whole, seconds, strict=True):
+        write_bvh(motion, _folder("mine") / f"take{s}.bvh")
+    with pytest.warns(
+        UserWarning, match=r"mine: \d clips are too few .* split by time: train \d+ s"
+    ):
+        assert main(["prepare", "mine"]) == 0
+    data = Prepared.load("runs/mine.npz")
+    assert all(data.clips(split) for split in ("train", "val", "test"))
+    assert any(re.fullmatch(r"mine/take\d+, \d+ to \d+ s_mirrored", name) for name in data.names)
+    assert sum(map(len, data.clips("val"))) > 64  # a window of training
+    assert sum(map(len, data.clips("train"))) / 60 > 0.6 * sum(seconds)
+    if len(seconds) == 1:  # its parts are what was recorded then
+        encoding = JointAngles(Skeleton.canonical(), contacts=True)
+        name = data.names[data.splits.index("val")]
+        first, last = (30 * int(word) for word in re.findall(r"(\d+) to (\d+) s", name)[0])
+        wanted, found = whole[0].positions()[first:last], encoding.positions(data.clips("val")[0])
+        frames = range(-15, 16)  # seconds in names are rounded
+        gaps = [
+            (found[60, 4] - found[60, 0] - wanted[60 + i, 4] + wanted[60 + i, 0]).norm()
+            for i in frames
+        ]
+        assert min(gaps) < 0.02
+
+
+def test_too_little_says_how_much_is_needed(tmp_path):
+    for name in ("a", "b"):
+        write_bvh(made.make(seconds=5), tmp_path / f"{name}.bvh")
+    with pytest.raises(DataError, match=r"has 2 clips, the longest of 5\.0 s.*3 clips.*than 30 s"):
+        prepare(tmp_path)
+
+
+def test_three_clips_are_enough_unless_one_is_bad(tmp_path):
+    for name in ("a", "b", "c"):
+        write_bvh(made.make(seconds=32), tmp_path / f"{name}.bvh")
+    data = prepare(tmp_path)
+    (held_out,) = [n[-1] for n, s in zip(data.names, data.splits, strict=True) if s == "val"]
+    (tmp_path / f"{held_out}.bvh").write_text("no motion")
+    with pytest.warns(UserWarning) as caught:
+        data = prepare(tmp_path, skip_bad=True)
+    assert "1 of 3 files" in str(caught[0].message) and "split by time" in str(caught[1].message)
+    assert data.clips("val")
+
+
+def test_the_command_line_reads_a_folder_as_the_library_does(tmp_path, monkeypatch, capsys):
+    """A rig whose rest pose is no body, a T-pose in front, zeros before it, half the true rate."""
+    monkeypatch.chdir(tmp_path)
+    names = "abc"
+    for i, name in enumerate(names):
+        clip = redrawn(made.make(seconds=2, speed=1 + i / 4), 1)
+        zeros = replace(clip[:1], rotations=torch.eye(3).expand(1, 21, 3, 3))
+        write_bvh(replace(clip[:1] + zeros + clip, fps=15.0), _folder("mine") / f"{name}.bvh")
+    write_bvh(redrawn(made.make(seconds=1, speed=0.0), 1), "stands.bvh")
+    given = ["--fps", "30", "--tpose-first", "--drop-zeros", "--reference", "stands.bvh"]
+    assert main(["prepare", "mine", *given]) == 0
+    data = Prepared.load("runs/mine.npz")
+    assert data.lengths.tolist() == [60] * len(data.names)
+    encoding = JointAngles(Skeleton.canonical(), contacts=True)
+    for i, name in enumerate(names):
+        clip = data.features.split(60)[data.names.index(f"mine/{name}")]
+        wanted = made.make(seconds=2, speed=1 + i / 4).positions()
+        reach = [(p - p[:, :1]).norm(dim=-1) for p in (encoding.positions(clip), wanted)]
+        assert (reach[0] - reach[1]).abs().max() < 0.03  # of each point from the hips
+    assert main(["prepare", "mine", *given[:-1], "mine/a.bvh"]) == 1
+    assert "at no time does the body stand" in capsys.readouterr().err
+    assert main(["prepare", "gaits", *given]) == 1
+    assert "leave out fps, tpose_first, drop_zeros, reference" in capsys.readouterr().err
+    assert main(["prepare", "mine", "--fps", "0"]) == 1
+    assert "fps=0" in capsys.readouterr().err
+
+
+def test_a_prepared_file_has_been_read(gaits, tmp_path):
+    gaits.save(tmp_path / "gaits.npz")
+    with pytest.raises(DataError, match="leave out units"):
+        Prepared.find(tmp_path / "gaits.npz", units="m")

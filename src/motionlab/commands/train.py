@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from ..errors import MotionLabError
+from .folder import Folder
 from .sample import check_generates
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class Train:
     """Processes, one a device."""
     nodes: int = 1
     """Machines."""
+    folder: OmitArgPrefixes[Folder] = field(default_factory=Folder)
 
     def run(self) -> None:
         from ..training import GAMES, PRESETS
@@ -74,7 +76,7 @@ class Train:
         chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
         style = "locomotion" if "lstm-gmm" in self.model else self.model.rpartition("-")[2]
-        data = Prepared.find(self.data or style)
+        data = Prepared.find(self.data or style, **self.folder.reading())
         if self.model == "lstm-gmm":
             data = data.without_contacts()
         start = find(self.start) if self.start else None
@@ -109,7 +111,7 @@ class Train:
         start = find(self.start or self.model.replace("refiner", "lstm-gmm"))
         generator = load(start)
         check_generates(generator, self.start or self.model)
-        data = Prepared.find(self.data or "locomotion")
+        data = Prepared.find(self.data or "locomotion", **self.folder.reading())
         judge = Judge(generator, data)  # says now what it would have to say after the game
         device = None if self.accelerator == "auto" else self.accelerator
         train_game(

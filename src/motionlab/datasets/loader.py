@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import os
 import threading
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,11 +13,13 @@ from pathlib import Path
 import torch
 from tqdm import tqdm
 
-from ..errors import DataError, MotionFileError, MotionLabError
+from ..errors import DataError
 from ..io.bvh import parse_bvh
 from ..io.bvh_reading import Reading
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..motion import Motion
+from ..retargeting.stance import stances
+from ..skeleton import Skeleton
 from . import cache, files, locomotion
 from .registry import (
     EXAMPLES,
@@ -31,6 +32,7 @@ from .registry import (
     choose,
     sources,
 )
+from .report import Report
 from .splits import assign
 
 _lock = threading.Lock()
@@ -183,6 +185,8 @@ def from_folder(
     drop_zeros: bool = False,
     split: str | None = None,
     skip_bad: bool = False,
+    skeleton: Skeleton | None = None,
+    reference: Motion | str | os.PathLike | None = None,
 ) -> list[Motion]:
     """All motion files of a folder and its subfolders, BVH, Acclaim, glTF: a reader's own clips.
 
@@ -196,7 +200,11 @@ def from_folder(
     pattern : which files, as for `pathlib.Path.glob`; None takes all that end in .bvh, .amc, .glb
         or .gltf.
     split : only the files of this split; which are in it depends on the files' names alone.
-    skip_bad : leave out files that can't be read, with a warning, instead of raising.
+    skip_bad : leave out files that can't be read, or retargeted, with a warning, instead of raising.
+    skeleton : retarget all clips to it, such as `Skeleton.canonical()`; None leaves them as they are.
+    reference : a clip, or its file, of the rig in which a person stands, for retargeting. Clips of one
+        rig whose rest pose does not stand get one set of joint axes by it; without it they are learned
+        from these clips together (`retargeting.stance`), which is said in a warning.
 
     Returns
     -------
@@ -205,13 +213,14 @@ def from_folder(
     Raises
     ------
     DataError : there is no such folder or no such file in it, or files that can't be read; the
-        message names all of them.
-    BvhError : an argument makes no sense.
+        message names all of them. With `skip_bad`: there is no other.
+    MotionFileError : an argument makes no sense, or `reference` can't be read.
+    RetargetError : nobody stands in `reference`, or it is of another rig than all clips.
     """
     found = read_folder(
-        path, pattern=pattern, split=split, skip_bad=skip_bad, units=units, up=up, fps=fps,
-        root=root, rigid=rigid, roles=roles, animation=animation, tpose_first=tpose_first,
-        drop_zeros=drop_zeros,
+        path, pattern=pattern, split=split, skip_bad=skip_bad, skeleton=skeleton,
+        reference=reference, units=units, up=up, fps=fps, root=root, rigid=rigid, roles=roles,
+        animation=animation, tpose_first=tpose_first, drop_zeros=drop_zeros,
     )  # fmt: skip
     return [motion for _, motion in found]
 
@@ -224,38 +233,61 @@ def read_folder(
     pattern: str | None = None,
     split: str | None = None,
     skip_bad: bool = False,
+    skeleton: Skeleton | None = None,
+    reference: Motion | str | os.PathLike | None = None,
     **reading,
 ) -> list[tuple[str, Motion]]:
     """`from_folder`, each clip with its split before it, and with something done to each.
 
-    then : what is done; an error that it raises is a fault of the file, as one in reading is.
+    then : what is done after reading, before retargeting; an error that it raises is a fault of the
+        file, as one in reading is.
     """
     check_split(split)
     how = Reading(**reading)
-    folder, chosen = _find(path, pattern, split)
-    motions, faults, doubtful = [], [], {}
+    if reference is not None and skeleton is None:
+        raise DataError("reference= tells how to retarget; say with skeleton= to which body, too.")
+    stance = _standing(reference, how)
+    # what axes a rig has must not depend on the split that is asked for
+    folder, chosen = _find(path, pattern, None if skeleton else split)
+    report, found = Report(folder, len(chosen)), []
     with _progress(f"reading {folder.name}", len(chosen)) as bar:
         for file, name, its in chosen:
-            try:
+            with report.of(file, name):
                 motion, doubts = read_motion(file, how, folder.resolve().name)
-                for about, said in doubts.items():
-                    doubtful.setdefault(about, []).append(f"{file}: {said}")
-                motions.append((its, then(replace(motion, name=name))))
-            except MotionFileError as error:
-                faults.append(str(error))
-            except MotionLabError as error:
-                faults.append(f"{file}: {error}")
+                report.doubt(file, doubts)
+                found.append((file, its, then(replace(motion, name=name))))
             bar.update()
-    for said in doubtful.values():
-        count = f"{folder}, {len(said)} of {len(chosen)} files, first " if len(said) > 1 else ""
-        warnings.warn(count + said[0], stacklevel=4)
-    if faults:
-        message = f"{folder}: {len(faults)} of {len(chosen)} files can't be used:\n  "
-        message += "\n  ".join(faults)
-        if not skip_bad:
-            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True (--skip-bad).")
-        warnings.warn(message, stacklevel=4)
-    return motions
+    if skeleton is not None and found:
+        found = _retargeted(found, skeleton, stance, split, report)
+    report.tell(skip_bad, stacklevel=5)
+    return [(its, motion) for _, its, motion in found]
+
+
+def _standing(reference: Motion | str | os.PathLike | None, how: Reading) -> Motion | None:
+    """The reference, read as the clips are; its first frame is no worse for being a T-pose."""
+    if reference is None or isinstance(reference, Motion):
+        return reference
+    return read_motion(reference, replace(how, tpose_first=False))[0]
+
+
+def _retargeted(
+    found: list[tuple[Path, str, Motion]],
+    skeleton: Skeleton,
+    reference: Motion | None,
+    split: str | None,
+    report: Report,
+) -> list[tuple[Path, str, Motion]]:
+    """The clips of a split on a skeleton, those of one rig by the same axes."""
+    stood = stances([motion for *_, motion in found], skeleton, reference)
+    report.said += stood.said
+    brought = []
+    with _progress("retargeting", len(found)) as bar:
+        for (file, its, motion), stance in zip(found, stood.references, strict=True):
+            if split in (None, its):
+                with report.of(file, motion.name):
+                    brought.append((file, its, motion.retarget(skeleton, reference=stance)))
+            bar.update()
+    return brought
 
 
 def _find(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import warnings
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +21,9 @@ import torch
 from torch import Tensor
 
 from .. import datasets, encodings
-from ..datasets.loader import read_folder
+from ..datasets.loader import read_folder, stance
+from ..datasets.locomotion import bring
+from ..datasets.splits import LONG, SMALLEST, SPLITS, by_time
 from ..encodings import JointAngles, Normalizer, RootRelative
 from ..errors import DataError, TrainingError
 from ..motion import Motion
@@ -38,7 +41,6 @@ DANCES = {
 }
 DANCE_FPS, STATURE = 60.0, 1.54
 _ARRAYS = ("features", "lengths", "names", "splits", "mean", "std", "kept", "encoding")
-SPLITS = ("train", "val", "test")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +131,20 @@ class Prepared:
             ) from error
 
     @classmethod
-    def find(cls, source: str | os.PathLike) -> Prepared:
+    def find(cls, source: str | os.PathLike, **reading) -> Prepared:
         """A prepared file; or a data set or folder, made ready now if it was not before.
 
         What is made is kept in `file_of(source)`. Folders, whose clips may change, are always read.
+        reading : how to read a folder's files, as for `prepare`.
         """
         if Path(source).suffix == ".npz" or Path(source).is_file():
+            _refuse(source, reading)
             return cls.load(source)
         kept = file_of(source)
         if str(source) in (*datasets.names(), *DANCES) and kept.exists():
+            _refuse(source, reading)
             return cls.load(kept)
-        made = prepare(source, progress=True)
+        made = prepare(source, progress=True, **reading)
         made.save(kept)
         return made
 
@@ -166,13 +171,14 @@ def prepare(
     source : the name of a data set, a folder of motion files, or one of `DANCES`.
     progress : show how far it is.
     permissive : leave out clips whose licence forbids commercial use (of a data set).
-    reading : how to read a folder's files, such as `units`, `up` or `skip_bad`; see
+    reading : how to read a folder's files, such as `units`, `up`, `reference` or `skip_bad`; see
         `datasets.from_folder`. Files that can't be retargeted are bad, too.
 
-    Training clips are used twice, the second time mirrored. Rows are those of `JointAngles` with
-    contacts; see `Prepared.without_contacts`. Dances keep their skeleton and are not mirrored; what
-    was recorded at 120 frames a second is there twice at 60, odd frames and even ones. Their rows
-    are those of `RootRelative`, of a body of 1.54 m.
+    Where a folder's clips are too few for a split each, those longer than 30 s are split by time,
+    with a warning. Training clips are used twice, the second time mirrored. Rows are those of
+    `JointAngles` with contacts; see `Prepared.without_contacts`. Dances keep their skeleton and are
+    not mirrored; what was recorded at 120 frames a second is there twice at 60, odd frames and even
+    ones. Their rows are those of `RootRelative`, of a body of 1.54 m.
 
     Raises
     ------
@@ -192,9 +198,8 @@ def prepare(
     training = [clip for clip, split in zip(features, splits, strict=True) if split == "train"]
     if not training or "val" not in splits:
         raise DataError(
-            f"{source}: has {len(training) // 2} clips for training and {splits.count('val')} for "
-            "validation; there must be some of both. Which is for what depends on their names: "
-            "about one in ten is for validation. Give more clips, three at the least."
+            f"{source}: has {len(training)} clips for training and {splits.count('val')} for "
+            "validation; there must be some of both."
         )
     rows, lengths = torch.cat(features), torch.tensor([len(clip) for clip in features])
     normalizer = Normalizer.fit(training)
@@ -207,23 +212,30 @@ def _load(
 ) -> Iterator[tuple[str, list[Motion]]]:
     """Canonical clips of each split, in training with their mirror images; dances as they are."""
     if source in DANCES:
+        _refuse(source, reading)
         for split in SPLITS:
             yield split, _dances(source, split, permissive)
         return
-    own = None if str(source) in datasets.names() else _own(source, permissive, reading)
-    if own is None and reading:
-        raise DataError(
-            f"{source}: how its files are read is known; leave out {', '.join(reading)}."
-        )
+    known = str(source) in datasets.names()
+    if known:
+        _refuse(source, reading)
+    own = [] if known else _own(source, permissive, reading)
     for split in SPLITS:
-        if own is None:
+        if known:
             loaded = datasets.load(source, split, permissive=permissive)
-            motions = [_canonical(motion) for motion in loaded]
+            motions = [bring(motion, stance(motion.source)) for motion in loaded]
         else:
             motions = [motion for its, motion in own if its == split]
         if split == "train":
             motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
         yield split, motions
+
+
+def _refuse(source: str | os.PathLike, reading: dict) -> None:
+    if reading:
+        raise DataError(
+            f"{source}: how its files are read is known; leave out {', '.join(reading)}."
+        )
 
 
 def _dances(source: str, split: str, permissive: bool) -> list[Motion]:
@@ -241,11 +253,39 @@ def _own(source: str | os.PathLike, permissive: bool, reading: dict) -> list[tup
         raise DataError(
             f"{source}: licences are known of named data sets only, not of a folder's clips."
         )
-    return read_folder(source, then=_canonical, **reading)
+    found = read_folder(
+        source, then=lambda motion: motion.resample(FPS), skeleton=Skeleton.canonical(), **reading
+    )
+    if {"train", "val"} <= {split for split, _ in found}:
+        return found
+    return _by_time(source, [motion for _, motion in found])
 
 
-def _canonical(motion: Motion) -> Motion:
-    return motion.resample(FPS).retarget()
+def _by_time(source: str | os.PathLike, motions: list[Motion]) -> list[tuple[str, Motion]]:
+    """Parts of long clips with their splits; short ones are for training."""
+    parts = []
+    for motion in motions:
+        if motion.seconds <= LONG:
+            parts.append(("train", motion))
+            continue
+        for start, stop, split in by_time(len(motion), motion.fps, motion.name):
+            name = f"{motion.name}, {start / motion.fps:.0f} to {stop / motion.fps:.0f} s"
+            parts.append((split, replace(motion[start:stop], name=name)))
+    long = sum(motion.seconds > LONG for motion in motions)
+    if not long:
+        longest = max(motion.seconds for motion in motions)
+        raise DataError(
+            f"{source}: has {len(motions)} clips, the longest of {longest:.1f} s, too little to keep "
+            f"some for validation. Give more: {SMALLEST} clips at the least, or one longer than "
+            f"{LONG:.0f} s, which is split by time."
+        )
+    seconds = {split: sum(m.seconds for its, m in parts if its == split) for split in SPLITS}
+    warnings.warn(
+        f"{source}: {len(motions)} clips are too few for a split each, so {long} are split by time: "
+        + ", ".join(f"{split} {its:.0f} s" for split, its in seconds.items()) + ".",
+        stacklevel=2,
+    )  # fmt: skip
+    return parts
 
 
 def _halves(motion: Motion) -> list[Motion]:

@@ -1,0 +1,46 @@
+"""How the files of a folder are read: what `motionlab prepare` and `motionlab train` both ask."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import roles
+
+
+@dataclass
+class Folder:
+    """Of a folder's files; all of them are read alike."""
+
+    units: float | str | None = None
+    """Their unit: m, dm, cm, mm, in, ft, or metres per unit; cm for BVH if left out, m for glTF."""
+    up: str | None = None
+    """Their axis that points up: y, z, x, or with a minus, as --up=-z; y if left out, with a warning
+    of bodies that are never upright."""
+    fps: float | None = None
+    """Frames per second, if their own frame time is wrong."""
+    root: str | None = None
+    """Name of the ROOT, or node, to begin with, of files that hold several bodies."""
+    animation: str | None = None
+    """Name or number of the animation to read, of glTF files that hold several."""
+    rigid: str | None = None
+    """mean: put joints that slide against their parents at their mean offset; refused if left out."""
+    roles: Path | None = None
+    """TOML or JSON file that says which joint is which, as `info` prints it."""
+    tpose_first: bool = False
+    """Leave out frame 0, a T-pose for calibration."""
+    drop_zeros: bool = False
+    """Leave out leading frames in which every rotation is zero."""
+    reference: Path | None = None
+    """A file of their rig in which a person stands, arms hanging or spread: tells how joint axes
+    lie where the rest pose does not stand. If left out, it is looked for in the clips."""
+    skip_bad: bool = False
+    """Leave out files that can't be read or brought to the canonical skeleton."""
+
+    def reading(self) -> dict:
+        """What was chosen, as `datasets.from_folder` takes it."""
+        left_out = lambda value: value is None or value is False
+        chosen = {name: value for name, value in vars(self).items() if not left_out(value)}
+        if self.roles is not None:
+            chosen["roles"] = roles.read(self.roles)
+        return chosen

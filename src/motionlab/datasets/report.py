@@ -1,0 +1,61 @@
+"""What is to be said of a folder's files: faults by file, and each doubt once, with a count."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import DataError, MotionFileError, MotionLabError
+
+
+class Report:
+    """Gathers what goes wrong with the files of a folder while all of them are tried."""
+
+    def __init__(self, folder: Path, files: int) -> None:
+        self.folder, self.files = folder, files
+        self.said: list[str] = []  # of the folder as a whole
+        self._faults: list[str] = []
+        self._doubts: dict[str, list[str]] = {}
+
+    @contextmanager
+    def of(self, file: Path, name: str) -> Iterator[None]:
+        """What is done to one file here: its errors are faults, its warnings doubts.
+
+        name : of its clip, by which warnings of several files would differ.
+        """
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            try:
+                yield
+            except MotionFileError as error:  # names the file
+                self._faults.append(str(error))
+            except MotionLabError as error:
+                self._faults.append(f"{file}: {error}")
+        for warning in told:
+            said = str(warning.message)
+            self.doubt(file, {said.replace(repr(name), ""): said})
+
+    def doubt(self, file: Path, doubts: dict[str, str]) -> None:
+        """Something to be said of a file, by what it is about."""
+        for about, said in doubts.items():
+            self._doubts.setdefault(about, []).append(f"{file}: {said}")
+
+    def tell(self, skip_bad: bool, stacklevel: int) -> None:
+        """Warn of all doubts, and of the faults if they may be; raise DataError if they may not, or
+        if no file is left."""
+        for said in self._doubts.values():
+            several = f"{self.folder}, {len(said)} of {self.files} files, first "
+            warnings.warn(several * (len(said) > 1) + said[0], stacklevel=stacklevel)
+        for said in self.said:
+            warnings.warn(f"{self.folder}: {said}", stacklevel=stacklevel)
+        if not self._faults:
+            return
+        message = f"{self.folder}: {len(self._faults)} of {self.files} files can't be used:\n  "
+        message += "\n  ".join(self._faults)
+        if len(self._faults) == self.files:
+            raise DataError(f"{message}\nNone is left; mend them, or name another folder.")
+        if not skip_bad:
+            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True (--skip-bad).")
+        warnings.warn(message, stacklevel=stacklevel)
