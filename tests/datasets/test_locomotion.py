@@ -10,11 +10,13 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+import roma
 import torch
 
 from motionlab import Skeleton, datasets
 from motionlab.datasets import cache, loader, locomotion, registry
 from motionlab.errors import DataError
+from motionlab.retargeting.stance import stances
 
 needs_data = pytest.mark.usefixtures("recorded_clips")
 SOURCES = {"accad": 38, "bandai-locomotion": 1067, "cmu": 3}
@@ -105,6 +107,8 @@ def test_unknown_clip():
 def test_stances_are_of_the_list():
     names = {clip.name for clip in registry.members("locomotion")}
     assert {name for name, _ in locomotion.STANCES.values()} <= names
+    for source, clips in locomotion.LEARNED.items():
+        assert set(clips) <= {c.name for c in registry.choose(source)} & names
 
 
 def test_mirrored_gaits_follow_their_clips():
@@ -156,7 +160,7 @@ def test_the_cache_format_is_that_of_this_retargeting():
     )
     points = locomotion.bring(replace(small, source="made")).positions()
     hand, ankle, toes = (points[[20, 60, 100], CANONICAL.index(f"left_{part}")] for part in PARTS)
-    assert locomotion.FORMAT == 4
+    assert locomotion.FORMAT == 5
     expected = torch.tensor(GOLDEN)
     torch.testing.assert_close(torch.stack([hand, ankle, toes]), expected, rtol=0, atol=1e-3)
 
@@ -216,6 +220,16 @@ def test_load_some(own_cache):
         assert motion.skeleton.matches(Skeleton.canonical())
         assert motion.fps == 30 and len(motion) == frames[motion.name]
         assert motion.contacts is not None and 0.02 < motion.contacts.float().mean() < 0.9
+
+
+@needs_data
+def test_any_clips_of_a_rig_tell_the_same_axes_together():
+    for source, names in locomotion.LEARNED.items():
+        clips = datasets.load(source, clips=names, download=False)
+        wanted = loader.stance(source).orientations()
+        for some in (clips[::2], clips[1::2]):
+            found = stances(some, CANONICAL).references[0].orientations()
+            assert torch.rad2deg(roma.rotmat_geodesic_distance(found, wanted)).max() < 1
 
 
 @needs_data

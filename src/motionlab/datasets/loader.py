@@ -135,6 +135,9 @@ def _process(name: str, download: bool | None) -> tuple[int, Callable[[Motion], 
 @functools.cache
 def stance(source: str, download: bool | None = None) -> Motion | None:
     """The motion by which `locomotion` knows how a source's rig stands; None if its rest pose does."""
+    if source in locomotion.LEARNED:
+        together = load(source, clips=locomotion.LEARNED[source], download=download)
+        return stances(together, Skeleton.canonical()).references[0]
     if source not in locomotion.STANCES:
         return None
     name, frames = locomotion.STANCES[source]

@@ -16,10 +16,18 @@ from ..retargeting import retarget
 from .registry import LOCOMOTION_FPS
 
 # Raise this when retargeting changes, so that cached results are made anew.
-FORMAT = 4
+FORMAT = 5
 # Where a source's rest pose is no standing body: a clip that begins with standing upright, and how
 # many frames of it.
 STANCES = {"accad": ("Male1_B1_StandToWalk", 30)}
+# Where nobody stands still either: clips that tell together how the source's rig stands.
+LEARNED = {
+    "bandai-locomotion": (
+        "dataset-1_dash_musical_001", "dataset-2_run_active_024", "dataset-2_run_normal_013",
+        "dataset-2_walk-turn-left_normal_025", "dataset-2_walk-turn-right_normal_020",
+        "dataset-2_walk_active_022", "dataset-2_walk_feminine_016", "dataset-2_walk_youthful_010",
+    ),
+}  # fmt: skip
 
 
 def bring(motion: Motion, stance: Motion | None = None) -> Motion:

@@ -243,7 +243,7 @@ def _dances(source: str, split: str, permissive: bool) -> list[Motion]:
     motions = datasets.load(name, split, permissive=permissive)
     motions = [m for m in motions if any(word in m.name for word in words)]
     if name != "aclstm-cmu":  # bodies of several sizes, in files whose rest pose lies down
-        motions = [motion.retarget() for motion in motions]
+        motions = [motion.retarget(reference=stance(motion.source)) for motion in motions]
     return [half for motion in motions for half in _halves(motion)]
 
 
