@@ -10,20 +10,25 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+import textwrap
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pybvh
+import torch
 from pybvh.bvhnode import BvhEndSite, BvhJoint, BvhNode, BvhRoot
 
 from ..errors import BvhError
+from ..kinematics import heading
 from ..motion import Motion
 from ..skeleton import Skeleton
 from .bvh_reading import Doubts, Reading, parse, read
 from .bvh_units import in_metres
 from .euler import to_euler
+from .root_motion import Parts, check_kind, root_name
+from .root_motion import split as split_root
 
 
 def read_bvh(
@@ -92,15 +97,27 @@ def _warn(where: str | os.PathLike, doubts: Doubts) -> None:
 
 
 def write_bvh(
-    motion: Motion, path: str | os.PathLike, *, units: str | float = "cm", overwrite: bool = True
+    motion: Motion,
+    path: str | os.PathLike,
+    *,
+    units: str | float = "cm",
+    overwrite: bool = True,
+    root_motion: str | None = None,
 ) -> None:
     """Write a motion as BVH, Euler angles in the skeleton's own rotation orders.
 
     The file appears whole or not at all. Angles and lengths have six decimals.
 
+    Parameters
+    ----------
+    root_motion : "in-place" leaves way and heading out; "ground" puts them on a root joint on the
+        floor, in whose frame the body moves, by position channels (`motionlab.io.root_motion`).
+        `read_bvh` folds such a root into the body again.
+
     Raises
     ------
     BvhError : the motion has no frames, or the path can't be written.
+    MotionError : there is no such root motion.
     """
     if not isinstance(motion, Motion) or not isinstance(path, str | os.PathLike):
         raise BvhError(
@@ -121,6 +138,9 @@ def write_bvh(
             f"{path}: without blanks and braces, which BVH can't have in names, two joints have "
             "the same name; rename one of them."
         )
+    check_kind(root_motion)
+    parts = None if root_motion is None else split_root(motion)
+    motion = motion if parts is None else parts.body
     order = _depth_first(motion.skeleton.parents)
     root_positions, rotations = motion.numpy()
     angles = to_euler(rotations, motion.skeleton.rotation_orders)
@@ -136,6 +156,8 @@ def write_bvh(
             whole = Path(folder) / "clip.bvh"
             pybvh.write_bvh_file(clip, whole)
             _restore_names(whole, names)
+            if root_motion == "ground":
+                _put_on_root(whole, root_name(names), parts, scale)
             os.replace(whole, path)
     except OSError as error:
         raise BvhError(
@@ -196,3 +218,23 @@ def _restore_names(file: Path, names: Sequence[str]) -> None:
         r"(ROOT|JOINT) joint(\d+)", lambda found: f"{found[1]} {names[int(found[2])]}", header
     )
     file.write_text(header + motion + rows, encoding="utf-8")
+
+
+def _put_on_root(file: Path, name: str, parts: Parts, scale: float) -> None:
+    """Hang the body of a file that has been written on a root joint that carries way and heading."""
+    head, _, rows = file.read_text(encoding="utf-8").partition("MOTION\n")
+    _, _, body = head.partition("ROOT ")
+    channels = "Xposition Yposition Zposition Yrotation Xrotation Zrotation"
+    head = (
+        f"HIERARCHY\nROOT {name}\n{{\n\tOFFSET 0.0 0.0 0.0\n\tCHANNELS 6 {channels}\n"
+        + textwrap.indent(f"JOINT {body}", "\t")
+        + "}\n"
+    )
+    way, yaw = parts.way.double() * scale, torch.rad2deg(heading(parts.turn)).double()
+    frames, time, *rows = rows.splitlines()
+    moved = [
+        f"{x:.6f} {y:.6f} {z:.6f} {angle:.6f} 0.000000 0.000000 {row}"
+        for (x, y, z), angle, row in zip(way.tolist(), yaw.tolist(), rows, strict=True)
+    ]
+    text = "\n".join([f"{head}MOTION", frames, time, *moved, ""])
+    file.write_text(text, encoding="utf-8")

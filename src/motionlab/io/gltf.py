@@ -27,6 +27,7 @@ from ..version import __version__
 from .bvh_reading import Reading
 from .gltf_mesh import Skin, bind_pose, mannequin
 from .gltf_reading import read
+from .root_motion import Parts, check_kind, root_name, split
 
 # Codes that glTF took from OpenGL.
 _COMPONENT = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
@@ -101,6 +102,7 @@ def write_gltf(
     *,
     color: str = "mocap",
     name: str | None = None,
+    root_motion: str | None = None,
 ) -> None:
     """Write a motion as a ``.glb`` file: skeleton, animation, and a mannequin that moves with it.
 
@@ -113,10 +115,13 @@ def write_gltf(
     path : must end in ``.glb``; a ``.gltf`` would be a third larger, or two files that get lost.
     color : a hex code, a name matplotlib knows, or a method's name ("mocap", "acLSTM", ...).
     name : what the body and its animation are called in the file; None: as the motion.
+    root_motion : "in-place" leaves way and heading out; "ground" puts them on a root joint on the
+        floor, in whose frame the body moves (`motionlab.io.root_motion`).
 
     Raises
     ------
     GltfError : the motion has no frames, or the path can't be written.
+    MotionError : there is no such root motion.
     ViewerError : the colour is none.
     """
     if not isinstance(motion, Motion) or not isinstance(path, str | os.PathLike):
@@ -131,8 +136,13 @@ def write_gltf(
         raise GltfError(f"{path}: the motion has no frames; there is nothing to write.")
     if path.suffix.lower() != ".glb":
         raise GltfError(f"{path}: the name must end in .glb, for example {path.stem}.glb.")
+    check_kind(root_motion)
+    parts = None if root_motion is None else split(motion)
+    motion = motion if parts is None else parts.body
     scene = _Scene(motion, name or motion.name or "motion")
-    scene.add_animation()
+    if root_motion == "ground":
+        scene.put_on_root()
+    scene.add_animation(parts)
     scene.add_mannequin(color)
     content = scene.content()
     try:
@@ -151,6 +161,7 @@ class _Scene:
 
     def __init__(self, motion: Motion, name: str):
         self.motion, self.name = motion, name
+        self.root: int | None = None  # the node of a root joint on the floor, if there is one
         self.bound = bind_pose(motion)
         self.buffer = bytearray()
         self.json: dict = {
@@ -179,26 +190,37 @@ class _Scene:
                 nodes[parent].setdefault("children", []).append(point)
         return nodes
 
-    def add_animation(self) -> None:
+    def put_on_root(self) -> None:
+        """Hang the body on one more joint, which carries way and heading.
+
+        It is in the skin, too, so that programs that look for bones there find it.
+        """
+        self.root = len(self.json["nodes"])
+        name = root_name(self.motion.skeleton.point_names)
+        self.json["nodes"].append({"name": name, "children": [0]})
+        self.json["scenes"][0]["nodes"] = [self.root]
+
+    def add_animation(self, parts: Parts | None) -> None:
         """Where the root is and how every joint is turned, each with a key at every frame."""
-        keys = self._add(np.arange(len(self.motion)) / self.motion.fps, "SCALAR", bounds=True)
+        self.keys = self._add(np.arange(len(self.motion)) / self.motion.fps, "SCALAR", bounds=True)
+        self.json["animations"] = [{"name": self.name, "channels": [], "samplers": []}]
+        self._move(0, self.motion.root_positions)
         turns = _quaternions(self.motion.rotations)
-        moves = [(0, "translation", self._add(self.motion.root_positions, "VEC3"))]
         for joint in range(self.motion.skeleton.joints):
-            moves.append((joint, "rotation", self._add(turns[:, joint], "VEC4")))
-        self.json["animations"] = [
-            {
-                "name": self.name,
-                "channels": [
-                    {"sampler": i, "target": {"node": node, "path": what}}
-                    for i, (node, what, _) in enumerate(moves)
-                ],
-                "samplers": [
-                    {"input": keys, "interpolation": "LINEAR", "output": values}
-                    for _, _, values in moves
-                ],
-            }
-        ]
+            self._move(joint, turns[:, joint])
+        if self.root is not None:
+            self._move(self.root, parts.way)
+            self._move(self.root, _quaternions(parts.turn))
+
+    def _move(self, node: int, values: Tensor) -> None:
+        """Let a node go by translations (frames, 3), or turn by quaternions (frames, 4)."""
+        path, kind = ("translation", "VEC3") if values.shape[1] == 3 else ("rotation", "VEC4")
+        (animation,) = self.json["animations"]
+        number, output = len(animation["samplers"]), self._add(values, kind)
+        animation["samplers"].append(
+            {"input": self.keys, "interpolation": "LINEAR", "output": output}
+        )
+        animation["channels"].append({"sampler": number, "target": {"node": node, "path": path}})
 
     def add_mannequin(self, color: str) -> None:
         """The mesh and its skin, on a node of its own: it is where its joints are."""
@@ -220,6 +242,7 @@ class _Scene:
         indices = self._add(skin.triangles.ravel(), "SCALAR", dtype="<u4", **_TRIANGLES)
         primitive = {"attributes": attributes, "indices": indices, "material": 0}
         joints = list(range(self.motion.skeleton.joints))
+        joints += [] if self.root is None else [self.root]
         self.json["materials"] = [{"name": self.name, "pbrMetallicRoughness": material}]
         self.json["meshes"] = [{"name": self.name, "primitives": [primitive]}]
         self.json["skins"] = [
@@ -241,6 +264,8 @@ class _Scene:
         matrices = np.tile(np.eye(4), (len(turns), 1, 1))
         matrices[:, :3, :3] = turns
         matrices[:, :3, 3] = -(turns @ places[..., None])[..., 0]
+        if self.root is not None:  # bound at the origin
+            matrices = np.concatenate([matrices, np.eye(4)[None]])
         return self._add(matrices.swapaxes(-1, -2), "MAT4")  # glTF goes down the columns
 
     def _add(self, values, kind: str, *, dtype="<f4", bounds=False, **view) -> int:
@@ -276,7 +301,7 @@ class _Scene:
 
 
 def _quaternions(rotations: Tensor) -> Tensor:
-    """Unit quaternions (frames, joints, 4), w last, of matrices (frames, joints, 3, 3).
+    """Unit quaternions (frames, ..., 4), w last, of matrices (frames, ..., 3, 3).
 
     q and -q are the same rotation; each has the sign nearer to the one before it, as programs
     interpolate the numbers.
