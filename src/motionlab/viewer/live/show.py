@@ -39,6 +39,7 @@ def show(
     fps: float | None = None,
     colors: str | Sequence[str] | None = None,
     autoplay: bool = True,
+    page: bool | None = None,
 ) -> Player | PageFigure:
     """Play one motion, or several side by side or in one picture, on one clock.
 
@@ -63,11 +64,13 @@ def show(
     skeleton, fps : of point positions; needed for those only.
     colors : one per motion: a method's name (see `motionlab.viewer.palette`) or a colour.
     autoplay : start when it comes into view (never if the reader asks for reduced motion).
+    page : plain HTML that needs no kernel. None: if the environment variable ``MOTIONLAB_VIEWER`` is
+        "page", as when a book is built.
 
     Returns
     -------
     A widget whose ``frame``, ``playing``, ``speed``, ``follow``, ``overlay`` and ``chosen`` can be
-    set, read and linked. With the environment variable ``MOTIONLAB_VIEWER=page`` (a book build) plain HTML.
+    set, read and linked; or plain HTML.
     """
     motions = _as_list(motion)
     names = _per_motion("labels", labels, len(motions))
@@ -97,7 +100,7 @@ def show(
         autoplay=bool(autoplay),
         **({} if choose is None else {"choose": str(choose), "chosen": int(chosen)}),
     )
-    if os.environ.get("MOTIONLAB_VIEWER") == "page":
+    if os.environ.get("MOTIONLAB_VIEWER") == "page" if page is None else page:
         return PageFigure(page_html(data, still_picture(tracks[0]), caption))
     return Player(data, caption=caption or "")
 

@@ -1,0 +1,40 @@
+"""A figure as a page of its own: one file that opens from disk, without kernel or network."""
+
+from __future__ import annotations
+
+import html
+
+from .figure import PageFigure
+from .player import bundle_path
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<link rel="icon" href="data:,">
+<title>{title}</title>
+<style>
+:root {{ color-scheme: light dark; }}
+body {{ font: 1rem/1.5 system-ui, sans-serif; max-width: 72rem; margin: 1rem auto; padding: 0 1rem; }}
+h1 {{ font-size: 1.2rem; margin: 0; }}
+p {{ margin: 0; opacity: 0.75; }}
+</style>
+</head>
+<body>
+<h1>{title}</h1>
+<p>{text}</p>
+{figure}
+<script>{script}</script>
+</body>
+</html>
+"""
+
+
+def whole_page(figure: PageFigure, title: str, text: str = "") -> str:
+    """The HTML of a page that holds one figure and the script that brings it to life."""
+    # "</script>" inside the script would end the element
+    script = bundle_path().read_text(encoding="utf-8").replace("</script", "<\\/script")
+    return _PAGE.format(
+        title=html.escape(title), text=html.escape(text), figure=figure.html, script=script
+    )
