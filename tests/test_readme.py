@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -73,7 +74,8 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     from motionlab.__main__ import main
     from motionlab.datasets import gaits
 
-    commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", README, re.MULTILINE)
+    section = README.partition("## A trained network")[2]
+    commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", section, re.MULTILINE)
     sample, still, dance, prepare, train, tune, again, dancer, game, mended = map(
         str.split, commands
     )
@@ -95,6 +97,29 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     assert read_bvh("mine.bvh").seconds == 10
     assert main([*mended[:3], "refiner-contacts", *mended[4:]]) == 0  # its own needs the data
     assert read_bvh("refined.bvh").seconds == 10
+
+
+def test_the_commands_for_your_own_clips_run(tmp_path, monkeypatch, capsys):
+    from motionlab import read_bvh, write_bvh
+    from motionlab.__main__ import main
+    from motionlab.datasets import gaits
+
+    section = README.partition("## Your own clips")[2].partition("\n## ")[0]
+    commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", section, re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    walk = gaits.make(seconds=1, speed=1.2)
+    (tmp_path / "my_clips").mkdir()
+    for name in ("my.bvh", "my_clips/a.bvh", "my_clips/b.bvh"):
+        write_bvh(walk, name)
+    larger = replace(walk.skeleton, offsets=1.2 * walk.skeleton.offsets)
+    write_bvh(replace(walk[:1], skeleton=larger), "rig.bvh")
+    for command in commands:
+        assert main(command.split()) == 0, command
+    assert len(commands) == 7 and "Traceback" not in capsys.readouterr().err
+    assert read_bvh("on_rig.bvh").skeleton.matches(larger, 1e-3)
+    made = {"my.html", "my.glb", "on_rig.bvh", "clean.bvh", "dream.glb"}
+    assert made <= {path.name for path in tmp_path.iterdir()}
+    assert {path.name for path in (tmp_path / "for_the_engine").iterdir()} == {"a.glb", "b.glb"}
 
 
 def test_what_the_readme_links_to_is_there():

@@ -11,8 +11,11 @@ from typing import Annotated
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
+from .commands.clean import Clean
+from .commands.convert import Convert, Retarget
 from .commands.evaluate import Evaluate
 from .commands.info import Info
+from .commands.look import Look
 from .commands.prepare import Prepare
 from .commands.reproduce import Reproduce
 from .commands.sample import Sample
@@ -152,6 +155,10 @@ class Version:
 COMMANDS = (
     Annotated[Data, subcommand("data")]
     | Annotated[Info, subcommand("info")]
+    | Annotated[Look, subcommand("look")]
+    | Annotated[Convert, subcommand("convert")]
+    | Annotated[Retarget, subcommand("retarget")]
+    | Annotated[Clean, subcommand("clean")]
     | Annotated[Prepare, subcommand("prepare")]
     | Annotated[Train, subcommand("train")]
     | Annotated[Evaluate, subcommand("evaluate")]

@@ -3,8 +3,10 @@
 import json
 from dataclasses import replace
 
+import any_rig
 import pytest
 import torch
+from glb_reader import Glb
 
 import motionlab
 from motionlab.__main__ import main
@@ -65,6 +67,32 @@ def test_sample_with_locked_feet(here, shipped, monkeypatch, knows_contacts):
     assert (expected - motion.positions()).abs().max() > 0.01
     written = motionlab.read_bvh("a.bvh").positions()
     torch.testing.assert_close(written, expected, rtol=0, atol=1e-3)
+
+
+def test_sample_onto_a_rig_and_as_glb(here, shipped, capsys):
+    """The rig's joints have axes drawn anyhow; a person stands in its one frame."""
+    command = ["sample", str(shipped), "--seconds", "1"]
+    model = motionlab.load(shipped)
+    with torch.no_grad():
+        chance = torch.Generator().manual_seed(0)
+        made = model.generate(30, model.starts[0], temperature=0.5, generator=chance)[0]
+    motion = model.encoding.to_motion(made)
+    taller = replace(motion.skeleton, offsets=1.2 * motion.skeleton.offsets)
+    stance = motionlab.Motion(taller, torch.zeros(1, 3), torch.eye(3).repeat(1, 21, 1, 1), 30)
+    motionlab.write_bvh(any_rig.drawn(stance, any_rig.random_axes(21, 0)), "rig.bvh", units="m")
+    onto = ["--skeleton", "rig.bvh", "--rig-units", "m"]
+    assert main([*command, *onto, "--out", "b.bvh"]) == 0
+    assert "onto rig, from foot to head 1.34 m and now 1.61 m" in capsys.readouterr().out
+    found = motionlab.read_bvh("b.bvh")
+    assert found.skeleton.matches(motionlab.read_bvh("rig.bvh", units="m").skeleton)
+    expected = motion.retarget(taller).positions()
+    torch.testing.assert_close(found.positions(), expected, rtol=0, atol=1e-3)
+    assert main([*command, *onto, "--out", "b.glb", "--root-motion", "ground"]) == 0
+    glb = Glb("b.glb")
+    assert glb.worlds(30).shape[0] == 30 and glb.tree["nodes"][-2]["name"] == "Root"
+    assert main([*command, "--out", "c.bvh", "--skeleton", "none.bvh"]) == 1
+    assert "none.bvh: can't be opened" in capsys.readouterr().err
+    assert not (here / "c.bvh").exists()
 
 
 def test_sample_of_several_characters(here, shipped, capsys):

@@ -1,4 +1,4 @@
-"""How the files of a folder are read: what `motionlab prepare` and `motionlab train` both ask."""
+"""How files are read: what the commands on files and on folders of them ask."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import roles
+from ..errors import MotionLabError
+from ..io.bvh_reading import Reading
+from ..io.root_motion import KINDS
 
 
 @dataclass
-class Folder:
-    """Of a folder's files; all of them are read alike."""
+class Files:
+    """How files are read; all of a folder alike."""
 
     units: float | str | None = None
     """Their unit: m, dm, cm, mm, in, ft, or metres per unit; cm for BVH if left out, m for glTF."""
     up: str | None = None
     """Their axis that points up: y, z, x, or with a minus, as --up=-z; y if left out, with a warning
     of bodies that are never upright."""
-    fps: float | None = None
-    """Frames per second, if their own frame time is wrong."""
     root: str | None = None
     """Name of the ROOT, or node, to begin with, of files that hold several bodies."""
     animation: str | None = None
@@ -27,6 +28,26 @@ class Folder:
     """mean: put joints that slide against their parents at their mean offset; refused if left out."""
     roles: Path | None = None
     """TOML or JSON file that says which joint is which, as `info` prints it."""
+
+    def how(self, **more) -> Reading:
+        """What was chosen, checked; raises MotionLabError."""
+        if self.root in KINDS:
+            raise MotionLabError(
+                f"--root {self.root}: names the ROOT of a file to read; --root-motion {self.root} "
+                "says what becomes of way and heading."
+            )
+        known = None if self.roles is None else roles.read(self.roles)
+        return Reading(
+            units=self.units, up=self.up, roles=known, root=self.root, rigid=self.rigid, **more
+        )
+
+
+@dataclass
+class Folder(Files):
+    """Of a folder's files, as `motionlab prepare` and `motionlab train` ask; all are read alike."""
+
+    fps: float | None = None
+    """Frames per second, if their own frame time is wrong."""
     tpose_first: bool = False
     """Leave out frame 0, a T-pose for calibration."""
     drop_zeros: bool = False

@@ -1,4 +1,4 @@
-"""`motionlab sample`: motion out of shipped or own weights, as BVH."""
+"""`motionlab sample`: motion out of shipped or own weights, as BVH or GLB."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, TrainingError
+from ..io.root_motion import KINDS
+from .clips import WRITERS, write
+from .rig import Rig, brought_onto
 
 if TYPE_CHECKING:
     from torch import nn
@@ -21,9 +24,9 @@ if TYPE_CHECKING:
 LONG, MOST = 30_000, 1_000_000  # frames, of all characters: some ten seconds of work; of memory
 
 
-@dataclass
-class Sample:
-    """Motion out of a trained model, as BVH: it goes on from a start as it likes."""
+@dataclass(kw_only=True)
+class Sample(Rig):
+    """Motion out of a trained model, as BVH or GLB: it goes on from a start as it likes."""
 
     model: Positional[Annotated[str, arg(metavar="NAME|WEIGHTS")]]
     """Shipped weights, such as lstm-gmm, or a file of your own."""
@@ -49,13 +52,18 @@ class Sample:
     """Let this one correct it: weights of your own."""
     lock_feet: Annotated[bool, arg(name="lock-feet")] = False
     """Hold toes still while they are in contact: as the network says, or else while they are slow."""
+    skeleton: Annotated[str | None, arg(metavar="RIG|canonical")] = None
+    """Bring the motion to this rig: a file in which a person stands, at rest or in a frame."""
+    root_motion: Literal[KINDS] | None = None
+    """ground: a root joint on the floor carries way and heading, as game engines want; in-place:
+    these are left out."""
 
     def run(self) -> None:
         import torch
 
-        from ..io import write_bvh
         from ..weights import load
 
+        rig = None if self.skeleton is None else self.find_rig(self.skeleton)
         model = load(self.model)
         check_generates(model, self.model)
         refiner = self._refiner(model)
@@ -84,8 +92,12 @@ class Sample:
         if self.lock_feet:
             motions = [locked(motion) for motion in motions]
         for motion, path, start in zip(motions, paths, chosen, strict=True):
-            write_bvh(motion, path)
-            print(f"{path}: {motion.seconds:.1f} s from {model.start_names[start]!r}")
+            said = []
+            if self.skeleton is not None:
+                motion, said = brought_onto(motion, rig)
+            write(motion, path, self.root_motion)
+            about = f"{motion.seconds:.1f} s from {model.start_names[start]!r}"
+            print(f"{path}: {'; '.join([about, *said])}")
 
     def _refiner(self, model: nn.Module) -> nn.Module | None:
         """What corrects motion of a model, if that is wanted."""
@@ -127,8 +139,8 @@ class Sample:
     def _paths(self) -> list[Path]:
         if not 1 <= self.characters <= 1000:
             raise MotionLabError(f"--characters {self.characters}: must be 1 to 1000.")
-        if self.out.suffix.lower() != ".bvh":
-            raise MotionLabError(f"--out {self.out}: the name must end in .bvh.")
+        if self.out.suffix.lower() not in WRITERS:
+            raise MotionLabError(f"--out {self.out}: the name must end in {' or '.join(WRITERS)}.")
         if self.characters == 1:
             paths = [self.out]
         else:

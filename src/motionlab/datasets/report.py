@@ -16,7 +16,7 @@ class Report:
     def __init__(self, folder: Path, files: int) -> None:
         self.folder, self.files = folder, files
         self.said: list[str] = []  # of the folder as a whole
-        self._faults: list[str] = []
+        self.faults: list[str] = []
         self._doubts: dict[str, list[str]] = {}
 
     @contextmanager
@@ -30,9 +30,9 @@ class Report:
             try:
                 yield
             except MotionFileError as error:  # names the file
-                self._faults.append(str(error))
+                self.faults.append(str(error))
             except MotionLabError as error:
-                self._faults.append(f"{file}: {error}")
+                self.faults.append(f"{file}: {error}")
         for warning in told:
             said = str(warning.message)
             self.doubt(file, {said.replace(repr(name), ""): said})
@@ -42,19 +42,24 @@ class Report:
         for about, said in doubts.items():
             self._doubts.setdefault(about, []).append(f"{file}: {said}")
 
+    def notes(self) -> list[str]:
+        """All doubts, those about the same in one, with a count."""
+        several = f"{self.folder}, {{}} of {self.files} files, first "
+        notes = [
+            several.format(len(said)) * (len(said) > 1) + said[0] for said in self._doubts.values()
+        ]
+        return notes + [f"{self.folder}: {said}" for said in self.said]
+
     def tell(self, skip_bad: bool, stacklevel: int) -> None:
         """Warn of all doubts, and of the faults if they may be; raise DataError if they may not, or
         if no file is left."""
-        for said in self._doubts.values():
-            several = f"{self.folder}, {len(said)} of {self.files} files, first "
-            warnings.warn(several * (len(said) > 1) + said[0], stacklevel=stacklevel)
-        for said in self.said:
-            warnings.warn(f"{self.folder}: {said}", stacklevel=stacklevel)
-        if not self._faults:
+        for said in self.notes():
+            warnings.warn(said, stacklevel=stacklevel)
+        if not self.faults:
             return
-        message = f"{self.folder}: {len(self._faults)} of {self.files} files can't be used:\n  "
-        message += "\n  ".join(self._faults)
-        if len(self._faults) == self.files:
+        message = f"{self.folder}: {len(self.faults)} of {self.files} files can't be used:\n  "
+        message += "\n  ".join(self.faults)
+        if len(self.faults) == self.files:
             raise DataError(f"{message}\nNone is left; mend them, or name another folder.")
         if not skip_bad:
             raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True (--skip-bad).")

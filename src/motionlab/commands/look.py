@@ -1,0 +1,45 @@
+"""`motionlab look`: a page that plays a file, from disk and by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..motion import Motion
+from .clips import Clips
+
+
+@dataclass(kw_only=True)
+class Look(Clips):
+    """A page that plays a file of motion; it opens in a browser, from disk, without a network."""
+
+    out: Path | None = None
+    """File to write, or a folder for many; NAME.html, or NAME_pages, if left out."""
+    height: int = 560
+    """Of the picture, pixels."""
+    open: bool = False
+    """Open the page in the browser, too."""
+
+    def run(self) -> None:
+        if self.out is None:
+            name = self.path.resolve()
+            folder = self.path.is_dir()
+            self.out = Path(f"{name.name}_pages" if folder else f"{name.stem}.html")
+        self.work(".html", self._page, (".html",))
+
+    def _page(self, motion: Motion, _: Path, target: Path) -> str:
+        import webbrowser
+
+        from ..training.checkpoints import write_whole
+        from ..viewer import show
+        from ..viewer.live.whole_page import whole_page
+
+        about = (
+            f"{motion.skeleton.joints} joints, {len(motion)} frames, {motion.seconds:.2f} s, "
+            f"{motion.fps:g} fps"
+        )
+        page = whole_page(show(motion, height=self.height, page=True), motion.name, about)
+        write_whole(target, lambda stream: stream.write(page.encode()))
+        if self.open:
+            webbrowser.open(target.resolve().as_uri())
+        return f"{about}; open it in a browser"

@@ -1,0 +1,295 @@
+"""`motionlab convert`, `retarget`, `clean`, `look`: what is written, and what is refused, told and left."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import any_rig
+import pytest
+import rig_names
+import torch
+from glb_reader import Glb
+
+from motionlab import Motion, Skeleton, read_bvh, write_bvh
+from motionlab.__main__ import main
+from motionlab.contacts import label
+from motionlab.datasets import gaits
+
+WALK = gaits.make(seconds=1, speed=1.2, name="walk")
+COMMANDS = ("convert", "retarget", "clean")
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working directory with walk.bvh and, in clips/, two files and one that is none."""
+    monkeypatch.chdir(tmp_path)
+    # drawing it takes ten seconds at first; tests/browser looks at the whole page
+    monkeypatch.setattr("motionlab.viewer.live.show.still_picture", lambda track: "data:,")
+    write_bvh(WALK, "walk.bvh")
+    (tmp_path / "clips" / "more").mkdir(parents=True)
+    write_bvh(WALK, "clips/a.bvh")
+    write_bvh(WALK[:10], "clips/more/b.bvh")
+    (tmp_path / "clips" / "notes.txt").write_text("no clip")
+    return tmp_path
+
+
+@pytest.fixture
+def bad(here):
+    """The folder with a file that can't be read, which comes first."""
+    (here / "clips" / "0.bvh").write_text("HIERARCHY\n")
+    return here
+
+
+def same(found: Motion, wanted: Motion, metres: float = 1e-4) -> bool:
+    return bool((found.positions() - wanted.positions()).abs().max() < metres)
+
+
+# -- what is written ------------------------------------------------------------------------------
+
+
+def test_convert_a_file(here, capsys):
+    assert main(["convert", "walk.bvh", "--out", "x.bvh"]) == 0
+    assert capsys.readouterr().out == "x.bvh: 30 frames at 30 fps, 21 joints\n"
+    assert same(read_bvh("x.bvh"), WALK)
+    assert main(["convert", "walk.bvh", "--out", "x.glb", "--fps", "15"]) == 0
+    assert "x.glb: 15 frames at 15 fps, 21 joints (read: 30 at 30)" in capsys.readouterr().out
+    points = torch.from_numpy(Glb("x.glb").worlds(15)[:, :26, :3, 3]).float()
+    torch.testing.assert_close(points, WALK[::2].positions(), rtol=0, atol=1e-4)
+
+
+def test_convert_reads_as_it_is_told(here):
+    axes = torch.tensor([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]).repeat(21, 1, 1)
+    odd = any_rig.drawn(WALK, axes)  # z up, also in the rest pose
+    turned = torch.cat([axes[:1] .mT @ odd.rotations[:, :1], odd.rotations[:, 1:]], 1)  # fmt: skip
+    odd = replace(odd, root_positions=WALK.root_positions @ axes[0], rotations=turned)
+    names = [name.replace("LeftFoot", "Paw") for name in odd.skeleton.names]
+    write_bvh(replace(odd, skeleton=replace(odd.skeleton, names=names)), "odd.bvh", units="in")
+    (here / "rig.toml").write_text('left_foot = "Paw"\n')
+    command = ["convert", "odd.bvh", "--out", "x.bvh", "--up", "z", "--units", "in"]
+    assert main([*command, "--roles", "rig.toml"]) == 0
+    assert same(read_bvh("x.bvh", roles={"left_foot": "Paw"}), WALK)
+
+
+def test_root_motion(here, capsys):
+    assert main(["convert", "walk.bvh", "--out", "x.bvh", "--root-motion", "ground"]) == 0
+    assert "way and heading on a root joint" in capsys.readouterr().out
+    assert same(read_bvh("x.bvh"), WALK) and "ROOT Root" in (here / "x.bvh").read_text()
+    assert main(["convert", "walk.bvh", "--out", "y.bvh", "--root-motion", "in-place"]) == 0
+    assert read_bvh("y.bvh").positions()[:, 0, [0, 2]].abs().max() < 1e-4
+
+
+@pytest.mark.parametrize("command", [["retarget", "--onto"], ["convert", "--skeleton"]])
+def test_onto_another_rig(here, capsys, command):
+    """Whose axes lie anyhow, in metres; a person stands in its only frame."""
+    wanted = replace(WALK.skeleton, offsets=1.2 * WALK.skeleton.offsets)
+    stance = Motion(wanted, torch.zeros(1, 3), torch.eye(3).repeat(1, 21, 1, 1), 30)
+    names = rig_names.names_of(rig_names.CONVENTIONS["unreal"])
+    write_bvh(any_rig.drawn(stance, any_rig.random_axes(21, 0), names), "rig.bvh", units="m")
+    name, option = command
+    assert main([name, "walk.bvh", option, "rig.bvh", "--rig-units", "m", "--out", "x.bvh"]) == 0
+    out = capsys.readouterr().out
+    assert "onto rig, from foot to head 1.34 m and now 1.61 m" in out and "note" not in out
+    found = read_bvh("x.bvh")
+    assert list(found.skeleton.names) == names
+    assert same(found, read_bvh("walk.bvh").retarget(wanted), 1e-3)
+
+
+def test_onto_the_canonical_body(here):
+    larger = replace(WALK.skeleton, offsets=1.2 * WALK.skeleton.offsets)
+    write_bvh(WALK.retarget(larger), "large.bvh")
+    assert main(["retarget", "large.bvh", "--out", "x.bvh"]) == 0
+    assert read_bvh("x.bvh").skeleton.matches(Skeleton.canonical())
+
+
+def test_clips_of_one_rig_get_one_set_of_axes(here, capsys):
+    """Told by one in which a person stands, named or not; none of the others does."""
+    axes = any_rig.random_axes(21, 4)
+    stance = Motion(WALK.skeleton, torch.zeros(9, 3), torch.eye(3).repeat(9, 21, 1, 1), 30)
+    for name, motion in {"rig/walk": WALK, "rig/run": gaits.make(seconds=1, speed=3.0)}.items():
+        (here / "rig").mkdir(exist_ok=True)
+        write_bvh(any_rig.drawn(motion, axes), f"{name}.bvh")
+    write_bvh(any_rig.drawn(stance, axes), "stands.bvh")
+    command = ["retarget", "rig", "--out", "done", "--force"]
+    assert main([*command, "--reference", "stands.bvh"]) == 0
+    named = read_bvh("done/walk.bvh")
+    (here / "stands.bvh").rename("rig/stands.bvh")
+    capsys.readouterr()
+    assert main(command) == 0
+    assert "rest pose of 3 clips of one rig is no standing body" in capsys.readouterr().out
+    assert same(read_bvh("done/walk.bvh"), named)
+    assert same(named, WALK, 0.03)  # whose contacts are guessed
+    assert main([*command[:-2], "x", "--reference", "none.bvh"]) == 1
+    assert "none.bvh: can't be opened" in capsys.readouterr().err
+
+
+def test_clean_holds_feet(here, capsys):
+    sliding = WALK.root_positions + torch.tensor([0.0, 0.0, 0.3]) * torch.arange(30)[:, None] / 30
+    write_bvh(replace(WALK, root_positions=sliding), "slides.bvh")
+    assert main(["clean", "slides.bvh", "--out", "x.bvh"]) == 0
+    said = capsys.readouterr().out
+    assert "toes down " in said and "sliding 30.0 cm/s and now 0.0" in said
+    found = read_bvh("x.bvh")
+    toes = found.positions()[
+        :, [found.skeleton.role("left_toes"), found.skeleton.role("right_toes")]
+    ]
+    down = label(found, "speed-height")[:, [1, 3]] & WALK.contacts[:, [1, 3]]
+    assert (torch.diff(toes, dim=0).norm(dim=-1)[down[1:] & down[:-1]]).median() < 1e-3
+
+
+def test_clean_leaves_what_needs_none(here):
+    assert main(["clean", "walk.bvh", "--out", "x.bvh"]) == 0
+    assert same(read_bvh("x.bvh"), WALK, 0.02)
+
+
+def test_look_makes_a_page_that_needs_nothing_else(here, capsys, monkeypatch):
+    assert main(["look", "walk.bvh"]) == 0
+    assert capsys.readouterr().out.startswith("walk.html: 21 joints, 30 frames, 1.00 s, 30 fps")
+    page = (here / "walk.html").read_text(encoding="utf-8")
+    assert "motionlab-player" in page and "<title>walk</title>" in page
+    assert page.count("</script>") == 2  # of the data and of the player
+    assert 'src="' not in page.split("<noscript>")[0] and '<link rel="stylesheet' not in page
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    assert main(["look", "walk.bvh", "--out", "y.html", "--open"]) == 0
+    assert opened == [(here / "y.html").as_uri()]
+    assert main(["look", "clips"]) == 0
+    assert (here / "clips_pages" / "more" / "b.html").exists()
+
+
+# -- folders --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_folder(here, capsys, command):
+    assert main([command, "clips", "--out", "done", "--to", "glb"]) == 0
+    assert written(here / "done") == {"a.glb", "more/b.glb"}
+    out = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in out] == ["done/a.glb", "done/more/b.glb"]
+
+
+def test_one_bad_file_stops_no_other(bad, capsys):
+    assert main(["convert", "clips", "--out", "done"]) == 1
+    said = capsys.readouterr().err
+    assert "clips: 1 of 3 files failed:\n  clips/0.bvh" in said and "--skip-bad" in said
+    assert written(bad / "done") == {"a.bvh", "more/b.bvh"}
+    assert main(["convert", "clips", "--out", "done", "--skip-bad", "--force"]) == 0
+    assert "clips/0.bvh" in capsys.readouterr().out
+    assert main(["convert", "clips", "--out", "done", "--skip-bad"]) == 1  # then all of them failed
+    assert capsys.readouterr().err.count("is there already") == 2
+
+
+def test_a_folder_into_itself_is_not_read_twice(here):
+    for _ in range(2):
+        assert main(["convert", "clips", "--out", "clips/done", "--to", "bvh", "--force"]) == 0
+    assert written(here / "clips") == {
+        "a.bvh", "more/b.bvh", "notes.txt", "done/a.bvh", "done/more/b.bvh",
+    }  # fmt: skip
+
+
+def test_a_doubt_is_told_once(here, capsys):
+    assert main(["convert", "clips", "--out", "done", "--units", "m"]) == 0
+    (note,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note")]
+    assert "clips, 2 of 2 files, first clips/a.bvh: from foot to head the body measures" in note
+    assert "pass another unit: --units=cm" in note
+
+
+def written(folder) -> set[str]:
+    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+
+
+# -- what is refused ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "look"])
+def test_nothing_is_overwritten_unasked(here, capsys, command):
+    target = "x.html" if command == "look" else "x.bvh"
+    (here / target).write_text("mine")
+    assert main([command, "walk.bvh", "--out", target]) == 1
+    assert f"{target}: is there already; --force" in capsys.readouterr().err
+    assert (here / target).read_text() == "mine"
+    assert main([command, "walk.bvh", "--out", target, "--force"]) == 0
+    assert (here / target).read_text() != "mine"
+
+
+BAD = {
+    "no such file": (["none.bvh", "--out", "x.bvh"], "none.bvh: there is no such file"),
+    "no suffix": (["walk.bvh", "--out", "x"], "x: ends in none of .bvh, .glb"),
+    "another suffix": (["walk.bvh", "--out", "x.fbx"], "name a file such as x.fbx.bvh"),
+    "no folder": (["walk.bvh", "--out", "none/x.bvh"], "there is no folder none; make it"),
+    "empty folder": (["empty", "--out", "x"], "empty: holds no file that can be read"),
+    "a folder onto a file": (["clips", "--out", "walk.bvh"], "is a folder, so this must name one"),
+    "a folder onto a name": (["clips", "--out", "x.glb"], "is a folder, so this must name one"),
+    "not a motion": (["clips/notes.txt", "--out", "x.bvh"], "notes.txt, line 1"),
+    "fps 0": (["walk.bvh", "--out", "x.bvh", "--fps", "0"], "--fps 0: must be a number above 0"),
+    "fps nan": (["walk.bvh", "--out", "x.bvh", "--fps", "nan"], "must be a number above 0"),
+    "file fps": (["walk.bvh", "--out", "x.bvh", "--file-fps", "-1"], "not a positive number"),
+    "up": (["walk.bvh", "--out", "x.bvh", "--up", "w"], "up='w' is no axis"),
+    "units": (["walk.bvh", "--out", "x.bvh", "--units", "ells"], "Unknown unit 'ells'"),
+    "root": (["walk.bvh", "--out", "x.bvh", "--root", "ground"], "--root-motion ground"),
+    "roles": (
+        ["walk.bvh", "--out", "x.bvh", "--roles", "wrong.toml"],
+        "walk.bvh: `roles` says that left_foot is 'Huf', but there is no such joint",
+    ),
+    "no roles": (["walk.bvh", "--out", "x.bvh", "--roles", "no.toml"], "no.toml: can't be opened"),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(("arguments", "said"), BAD.values(), ids=BAD)
+def test_bad_input_is_a_sentence_and_leaves_nothing(here, capsys, command, arguments, said):
+    (here / "empty").mkdir()
+    (here / "wrong.toml").write_text('left_foot = "Huf"\n')
+    before = written(here)
+    assert main([command, *arguments]) == 1
+    err = capsys.readouterr().err
+    assert said in err and "Traceback" not in err and err.startswith("motionlab: ")
+    assert written(here) == before
+
+
+def test_a_wrong_frame_time_is_mended_as_it_is_said(here, capsys):
+    text = (here / "walk.bvh").read_text().replace("Frame Time: 0.03333333333", "Frame Time: 30")
+    (here / "rate.bvh").write_text(text)
+    assert main(["convert", "rate.bvh", "--out", "x.bvh"]) == 1
+    assert "read the file with --file-fps=30" in capsys.readouterr().err
+    assert main(["convert", "rate.bvh", "--out", "x.bvh", "--file-fps=30"]) == 0
+    assert same(read_bvh("x.bvh"), WALK)
+
+
+def test_a_rig_without_legs(here, capsys):
+    s = WALK.skeleton
+    kept = [
+        i for i, name in enumerate(s.names) if not any(w in name for w in ("Leg", "Foot", "Toe"))
+    ]
+    bust = Skeleton([s.names[i] for i in kept], [kept.index(s.parents[i]) if i else -1 for i in kept],
+                    s.offsets[kept])  # fmt: skip
+    write_bvh(replace(WALK, skeleton=bust, rotations=WALK.rotations[:, kept]), "bust.bvh")
+    assert main(["convert", "bust.bvh", "--out", "x.glb", "--root-motion", "ground"]) == 0
+    assert main(["look", "bust.bvh"]) == 0
+    for command in ("retarget bust.bvh", "clean bust.bvh", "retarget walk.bvh --onto bust.bvh"):
+        assert main([*command.split(), "--out", "y.bvh"]) == 1
+        err = capsys.readouterr().err
+        assert "bust.bvh: " in err and "left_foot" in err, command
+    assert "--rig-roles" in err
+    assert not (here / "y.bvh").exists()
+
+
+def test_two_files_that_would_be_one(here, capsys):
+    write_bvh(WALK, here / "clips" / "a.BVH")
+    assert main(["convert", "clips", "--out", "done", "--force"]) == 1
+    assert capsys.readouterr().err.count("several files would be written there") == 2
+    assert written(here / "done") == {"more/b.bvh"}
+
+
+def test_a_file_into_a_folder_that_is_there(here):
+    (here / "done").mkdir()
+    assert main(["convert", "walk.bvh", "--out", "done", "--to", "glb"]) == 0
+    assert written(here / "done") == {"walk.glb"}
+
+
+def test_what_fails_half_way_leaves_nothing(here, capsys, monkeypatch):
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "disk full")))
+    for target in ("x.bvh", "x.glb"):
+        assert main(["convert", "walk.bvh", "--out", target]) == 1
+        assert "disk full" in capsys.readouterr().err
+    assert main(["look", "walk.bvh"]) == 1
+    assert not [p for p in written(here) if p.startswith(("x.", "walk.html", "."))]
