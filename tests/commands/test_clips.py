@@ -57,6 +57,15 @@ def test_convert_a_file(here, capsys):
     torch.testing.assert_close(points, WALK[::2].positions(), rtol=0, atol=1e-4)
 
 
+@pytest.mark.parametrize("root_motion", [[], ["--root-motion", "ground"]])
+def test_there_and_back(here, root_motion):
+    """A root joint on the floor is folded into the body again."""
+    assert main(["convert", "walk.bvh", "--out", "x.glb", *root_motion]) == 0
+    assert main(["convert", "x.glb", "--out", "y.bvh"]) == 0
+    assert same(read_bvh("y.bvh"), WALK)
+    assert main(["look", "x.glb"]) == 0
+
+
 def test_convert_reads_as_it_is_told(here):
     axes = torch.tensor([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]).repeat(21, 1, 1)
     odd = any_rig.drawn(WALK, axes)  # z up, also in the rest pose

@@ -19,7 +19,7 @@ from ..datasets.report import Report
 from ..errors import MotionFileError
 from ..io import write_bvh, write_gltf
 from ..io.bvh_reading import Reading
-from ..io.motion_file import SUFFIXES, is_motion, read_motion
+from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..motion import Motion
 from .folder import Files
 
@@ -153,7 +153,7 @@ def files_of(folder: Path) -> list[Path]:
     found = sorted(file for file in folder.rglob("*") if is_motion(file) and file.is_file())
     if not found:
         raise MotionFileError(
-            f"{folder}: holds no file that can be read; their names end in {', '.join(SUFFIXES)}."
+            f"{folder}: holds no file that can be read; their names end in {ENDINGS}."
         )
     return found
 

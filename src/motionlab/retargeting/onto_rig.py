@@ -11,6 +11,7 @@ else the part of its motion in which a person stands; else all of its motion.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import roma
@@ -24,6 +25,7 @@ from .rest_alignment import alignment, facing, frame, rest_points, stands
 from .retarget import NEEDED, retarget
 from .stance import find_stance
 
+_TILTED, _TURNED = 10.0, 2.0  # degrees by which a rest pose as people make it leans, or is turned
 _LEAST = 30  # frames that may be asked as a motion; fewer are poses
 _UPRIGHT = 0.5  # share of frames in which the trunk must be upright
 _LEANING = 0.7  # cosine of how far an upright trunk may lean
@@ -125,14 +127,14 @@ def _in_axes(rotations: Tensor, skeleton: Skeleton, axes: Tensor) -> Tensor:
 def _rest_turned(skeleton: Skeleton) -> Tensor:
     """Orientations (joints, 3, 3), all the same, that let a rest pose face +z, upright if it can."""
     points, roles = rest_points(skeleton), skeleton.roles
-    if stands(skeleton):
-        return torch.eye(3).repeat(skeleton.joints, 1, 1)
     at = lambda part: torch.stack([points[roles[f"{side}_{part}"]] for side in ("left", "right")])
     hips, shoulders, feet = at("upper_leg"), at("upper_arm"), at("foot")
     left = hips[0] - hips[1] + shoulders[0] - shoulders[1]
-    body = facing(points[None], skeleton)[0]
-    if not stands(reaxed(skeleton, body.mT.repeat(skeleton.joints, 1, 1))):
-        body = frame(left, shoulders.mean(0) - feet.mean(0))  # it lies, say
+    body = frame(left, shoulders.mean(0) - feet.mean(0))
+    if body[1, 1] > math.cos(math.radians(_TILTED)):
+        body = facing(points[None], skeleton)[0]
+        if body[2, 2] > math.cos(math.radians(_TURNED)):
+            body = torch.eye(3)
     return body.mT.repeat(skeleton.joints, 1, 1)
 
 
