@@ -29,7 +29,7 @@ def redrawn(motion: Motion, axes: torch.Tensor) -> Motion:
     )
 
 
-def random_axes(skeleton: Skeleton, seed: int) -> torch.Tensor:
+def random_axes(skeleton: Skeleton, seed: int = 0) -> torch.Tensor:
     """Axes (joints, 3, 3) that lie any way at all."""
     return roma.random_rotmat(skeleton.joints, generator=torch.Generator().manual_seed(seed))
 
@@ -95,3 +95,31 @@ def with_joints_between(motion: Motion, roles: tuple[str, ...]) -> Motion:
         rotations.insert(joint + 1, torch.eye(3).expand_as(rotations[joint]))
     body = Skeleton(tuple(names), tuple(parents), torch.stack(offsets), tuple(ends), s.end_offsets)
     return replace(motion, skeleton=body, rotations=torch.stack(rotations, 1))
+
+
+def with_more_joints(motion: Motion, joints: int, seed: int = 0) -> Motion:
+    """The motion on a rig of so many joints: more hang on any of its own, and move by themselves.
+
+    Some lie where their parent lies, as in many a rig.
+    """
+    s, random = motion.skeleton, torch.Generator().manual_seed(seed)
+    names, parents, offsets = list(s.names), list(s.parents), list(s.offsets)
+    ends, tips, rotations = (
+        list(s.end_parents),
+        list(s.end_offsets),
+        list(motion.rotations.unbind(1)),
+    )
+    sway = torch.sin(torch.arange(len(motion)) / 10)[:, None]
+    while len(names) < joints:
+        new, (any_of, in_place) = len(names), torch.rand(2, generator=random)
+        chain = 2 * any_of > 1  # on the joint before it, or on any
+        parents.append(new - 1 if chain else int(2 * any_of * new))
+        offsets.append((in_place > 0.2) * 0.08 * torch.randn(3, generator=random))
+        names.append(f"Extra{new}")
+        rotations.append(roma.rotvec_to_rotmat(sway * 0.3 * torch.randn(3, generator=random)))
+        ends.append(new)
+        tips.append(0.03 * torch.randn(3, generator=random))
+    body = Skeleton(
+        tuple(names), tuple(parents), torch.stack(offsets), tuple(ends), torch.stack(tips)
+    )
+    return replace(motion, skeleton=body, rotations=torch.stack(rotations, 1), contacts=None)
