@@ -28,6 +28,7 @@ from motionlab.feet.legs import knee_fronts, leg_joints
 from motionlab.solvers import lock_feet
 
 CANONICAL = Skeleton.canonical()
+UPPER_BODY = CANONICAL.names[1 : CANONICAL.role("left_upper_leg")]
 X, Y = torch.eye(3)[:2]
 RIGS = {
     "bones along x": along_bones(CANONICAL, X),
@@ -147,6 +148,51 @@ def test_no_rig_moves_a_gait_that_rests(which, seed, yaw, convention, between):
     motion = with_joints_between(motion, roles)
     motion = redrawn(motion, random_axes(motion.skeleton, seed))
     assert centimetres(lock_feet(motion, contacts.label(motion), floor=None), motion) < 1
+
+
+def without_joint(motion, name):
+    """The motion on a rig that lacks a joint; what hung on it hangs on the joint above."""
+    s = motion.skeleton
+    gone = s.names.index(name)
+    keep = [joint for joint in range(s.joints) if joint != gone]
+    above = [s.parents[gone] if parent == gone else parent for parent in s.parents]
+    number = {joint: i for i, joint in enumerate(keep)} | {-1: -1}
+    offsets = s.offsets + (torch.tensor(s.parents) == gone)[:, None] * s.offsets[gone]
+    ends = [i for i, parent in enumerate(s.end_parents) if parent != gone]
+    body = Skeleton(
+        tuple(s.names[joint] for joint in keep),
+        tuple(number[above[joint]] for joint in keep),
+        offsets[keep],
+        tuple(number[s.end_parents[end]] for end in ends),
+        s.end_offsets[ends],
+    )
+    return replace(motion, skeleton=body, rotations=motion.rotations[:, keep])
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    seed=st.integers(0, 10_000), yaw=st.floats(-3.2, 3.2),
+    gone=st.sets(st.sampled_from(CANONICAL.names[1:]), max_size=3),
+    nameless=st.sets(st.sampled_from(CANONICAL.names), max_size=2),
+    moved=st.sampled_from(UPPER_BODY), onto=st.sampled_from(CANONICAL.names),
+)  # fmt: skip
+def test_a_mutilated_rig_is_locked_right_or_refused(seed, yaw, gone, nameless, moved, onto):
+    motion = facing(walk(), yaw)
+    for name in sorted(gone):
+        motion = without_joint(motion, name)
+    s = motion.skeleton
+    names = [f"Thing{i}" if name in nameless else name for i, name in enumerate(s.names)]
+    parents = list(s.parents)
+    if {moved, onto} <= {*s.names} and s.names.index(onto) < s.names.index(moved):
+        parents[s.names.index(moved)] = s.names.index(onto)
+    motion = replace(motion, skeleton=replace(s, names=tuple(names), parents=tuple(parents)))
+    motion = redrawn(motion, random_axes(motion.skeleton, seed))
+    try:
+        locked = lock_feet(motion, contacts.label(motion), floor=None)
+    except SkeletonError as error:
+        assert len(str(error)) > 40
+    else:
+        assert centimetres(locked, motion) < 1
 
 
 def test_a_leg_that_does_not_hang_together_is_named():

@@ -7,6 +7,8 @@ points, and the knee of a leg that stays straight points where the hips face.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import torch
 from torch import Tensor
 
@@ -32,19 +34,51 @@ def leg_joints(skeleton: Skeleton) -> dict[str, list[int]]:
     SkeletonError : a joint is missing, or does not hang on the one above it.
     """
     joints = {part: [skeleton.role(f"{side}_{part}") for side in SIDES] for part in PARTS[:3]}
-    for side, upper in zip(SIDES, joints["upper_leg"], strict=True):
+    for side in SIDES:
         parts = [part for part in PARTS if f"{side}_{part}" in skeleton.roles]
-        for part, child in zip(parts, parts[1:], strict=False):
-            bone = skeleton.below(f"{side}_{part}", f"{side}_{child}")
-            if bone is None or (child != "toes" and bone.norm() < _BONE) or upper == 0:
-                names = (skeleton.names[skeleton.roles[f"{side}_{p}"]] for p in (part, child))
-                raise SkeletonError(
-                    f"The {side} leg of this skeleton has no bone from {part} to {child} "
-                    f"({' and '.join(names)}): the one must hang on the other, below hips, and "
-                    "thigh and shank be 1 cm long at least. Say which joints they are with "
-                    f"read_bvh(path, roles={{'{side}_{child}': 'NAME'}})."
-                )
+        for part, child in pairwise(parts):
+            if skeleton.below(f"{side}_{part}", f"{side}_{child}") is None:
+                raise _no_bone(skeleton, side, part, child)
+    if 0 in joints["upper_leg"]:
+        raise SkeletonError(
+            f"The root of this skeleton, {skeleton.names[0]}, is an upper leg: both legs must hang "
+            "on hips. Say which joints they are with read_bvh(path, roles={'hips': 'NAME'})."
+        )
     return joints | {"toes": [foot_points(skeleton)[1], foot_points(skeleton)[3]]}
+
+
+def leg_lengths(skeleton: Skeleton, points: Tensor) -> Tensor:
+    """Lengths (2, 2) in metres of thigh and shank, each left first, as they are in motion.
+
+    At rest a joint between may fold them.
+
+    Parameters
+    ----------
+    points : (..., frames, points, 3) metres.
+
+    Raises
+    ------
+    SkeletonError : one is shorter than 1 cm.
+    """
+    joints = leg_joints(skeleton)
+    lengths = []
+    for part, child in pairwise(PARTS[:3]):
+        bones = (points[..., joints[child], :] - points[..., joints[part], :]).norm(dim=-1)
+        lengths.append(bones.reshape(-1, 2).median(dim=0).values)
+        for side, short in zip(SIDES, (lengths[-1] < _BONE).tolist(), strict=True):
+            if short:
+                raise _no_bone(skeleton, side, part, child)
+    return torch.stack(lengths)
+
+
+def _no_bone(skeleton: Skeleton, side: str, part: str, child: str) -> SkeletonError:
+    names = (skeleton.names[skeleton.roles[f"{side}_{p}"]] for p in (part, child))
+    return SkeletonError(
+        f"The {side} leg of this skeleton has no bone from {part} to {child} "
+        f"({' and '.join(names)}): the one must hang on the other, and thigh and shank be 1 cm long "
+        f"at least. Say which joints they are with read_bvh(path, roles={{'{side}_{child}': "
+        "'NAME'})."
+    )
 
 
 def knee_fronts(skeleton: Skeleton, points: Tensor, world: Tensor) -> Tensor:
@@ -93,15 +127,13 @@ def flat_toes(skeleton: Skeleton, points: Tensor, held: Tensor) -> Tensor:
     if stands_on_floor(skeleton):
         heights = rest_heights(skeleton).to(points)
         return heights[[1, 3]] - heights.amin().clamp(max=0)
-    joints = leg_joints(skeleton)
-    hips, knees, ankles = (points[..., joints[part], :] for part in PARTS[:3])
-    legs = ((hips - knees).norm(dim=-1) + (knees - ankles).norm(dim=-1)).mean(-2)
+    joints, legs = leg_joints(skeleton), leg_lengths(skeleton, points).sum(0)
     found = []
     for i, (foot, toe) in enumerate(zip(joints["foot"], joints["toes"], strict=True)):
         tips = [toe] + [point for point, above in enumerate(skeleton.point_parents) if above == toe]
         drop = points[..., toe, 1] - points[..., tips, 1].amin(-1)
         drop = torch.where(held[..., i], drop, torch.nan).nanmedian(-1).values.nan_to_num(0.0)
-        found.append(torch.maximum(drop, (_ANKLE if toe == foot else _TOE) * legs[..., i]))
+        found.append(torch.maximum(drop, (_ANKLE if toe == foot else _TOE) * legs[i]))
     return torch.stack(found, -1)
 
 

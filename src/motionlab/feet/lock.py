@@ -20,7 +20,7 @@ from ..ik.turns import shortest_turn
 from ..kinematics import forward_kinematics
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .legs import PARTS, flat_toes, knee_fronts, leg_joints
+from .legs import PARTS, flat_toes, knee_fronts, leg_joints, leg_lengths
 from .planting import off_the_floor, steps
 
 GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
@@ -256,16 +256,13 @@ def _bent(
 ) -> Tensor:  # fmt: skip
     """Local rotations with legs that reach their ankles; feet keep the way they point."""
     rotations = rotations.clone()
-    fronts = knee_fronts(skeleton, points, world)
+    fronts, lengths = knee_fronts(skeleton, points, world), leg_lengths(skeleton, points)
     for i in range(2):
         upper, lower, foot, toes = (joints[part][i] for part in PARTS)
         knee_was = points[..., lower, :] - points[..., upper, :]
         shin_was = points[..., foot, :] - points[..., lower, :]
         # of legs that hang straight down at rest, whatever those of this rig do
-        offsets = [
-            bone.norm(dim=-1).median() * points.new_tensor([0.0, -1.0, 0.0])
-            for bone in (knee_was, shin_was)
-        ]
+        offsets = [length * points.new_tensor([0.0, -1.0, 0.0]) for length in lengths[:, i]]
         ahead = _knee_direction(knee_was, knee_was + shin_was, fronts[..., i, :])
         thigh, shank = two_bone(hips[..., i, :], ankle[..., i, :], ahead, *offsets)
         knee = thigh @ offsets[0]
