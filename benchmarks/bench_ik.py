@@ -1,5 +1,7 @@
 """Position inverse kinematics: `solve` for all frames at once against a loop over frames.
 
+Then what joints cost: a rig of 101 against one of 31, with exact and with noisy targets.
+
     python benchmarks/bench_ik.py [--frames 2000] [--loop 20] [--rounds 3] [--threads 1] [--save]
 
 The loops are timed on the first few frames only and scaled up. Targets are the points of a walking
@@ -13,10 +15,10 @@ from dataclasses import dataclass
 import roma
 import torch
 import tyro
-from interleaved import medians, save, table
+from interleaved import medians, save, table, verdict
 from scipy.optimize import least_squares
 
-from motionlab import Skeleton, forward_kinematics
+from motionlab import Motion, Skeleton, forward_kinematics
 from motionlab.datasets import gaits
 from motionlab.ik import solve
 
@@ -60,8 +62,46 @@ def main(options: Options) -> None:
         ]
         table(f"{label} targets, {len(targets)} frames, {options.threads} thread(s)", rows)
         numbers[label] = {"frames_per_second": rates}
+    numbers["joints"] = cost_of_joints(walk, options.rounds)
     if options.save:
         save("bench_ik", numbers)
+
+
+def cost_of_joints(walk: Motion, rounds: int) -> dict[str, float]:
+    """How many times longer 101 joints take than 31."""
+    rigs = [with_fingers(walk, joints) for joints in (31, 101)]
+    chance, found = torch.Generator().manual_seed(0), {}
+    for label, noise in (("exact", 0.0), ("noisy", 0.005)):
+        jobs = {}
+        for rig in rigs:
+            points = rig.positions()
+            targets = points + noise * torch.randn(points.shape, generator=chance)
+            jobs[f"{rig.skeleton.joints}"] = lambda s=rig.skeleton, t=targets: solve(s, t)
+        times = medians(jobs, rounds)
+        found[label] = times["101"] / times["31"]
+    table(
+        "101 joints / 31 joints",
+        [(name, f"{ratio:.1f} x", verdict(ratio, 5.0)) for name, ratio in found.items()],
+    )
+    return found
+
+
+def with_fingers(motion: Motion, joints: int) -> Motion:
+    """The motion on a rig with chains of three more joints on its hands and head, which bend."""
+    s = motion.skeleton
+    names, parents, offsets = list(s.names), list(s.parents), list(s.offsets)
+    hosts = [s.role(role) for role in ("left_hand", "right_hand", "head")]
+    chance = torch.Generator().manual_seed(0)
+    for new in range(s.joints, joints):
+        chain, knuckle = divmod(new - s.joints, 3)
+        names.append(f"Finger{chain}_{knuckle}")
+        parents.append(new - 1 if knuckle else hosts[chain % 3])
+        offsets.append(0.05 * torch.randn(3, generator=chance))
+    rig = Skeleton(tuple(names), tuple(parents), torch.stack(offsets), s.end_parents, s.end_offsets)
+    bends = 0.3 * torch.randn(1, joints - s.joints, 3, generator=chance)
+    bends = bends * torch.sin(torch.arange(len(motion)) / 10)[:, None, None]
+    turns = torch.cat([motion.rotations, roma.rotvec_to_rotmat(bends)], 1)
+    return Motion(rig, motion.root_positions, turns, motion.fps)
 
 
 def by_scipy(target: torch.Tensor) -> torch.Tensor:

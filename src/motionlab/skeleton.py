@@ -182,6 +182,16 @@ class Skeleton:
         return offset if end == start else None
 
     @cached_property
+    @torch.inference_mode(False)  # kept for later calls, which may need gradients
+    def rest_points(self) -> Tensor:
+        """Points (points, 3) in metres of the rest pose, the root at the origin."""
+        points = torch.zeros(self.points, 3)
+        offsets = torch.cat([self.offsets, self.end_offsets])
+        for point, parent in enumerate(self.point_parents[1:], start=1):
+            points[point] = points[parent] + offsets[point]
+        return points
+
+    @cached_property
     def mirror_partners(self) -> tuple[int, ...]:
         """For each joint the joint on the other side of the body, itself if it is central."""
         return partners(self.names, self.roles)
@@ -200,9 +210,7 @@ class Skeleton:
 
     def _off_middle(self) -> Tensor:
         """How far in metres each joint (joints,) lies off the body's middle; 0 if that is unknown."""
-        points = torch.zeros(self.joints, 3)
-        for joint, parent in enumerate(self.parents[1:], start=1):
-            points[joint] = points[parent] + self.offsets[joint]
+        points = self.rest_points[: self.joints]
         pairs = [(a, b) for a, b in enumerate(self.mirror_partners) if a < b]
         across, middle = torch.tensor([1.0, 0.0, 0.0]), points[self.roles.get("hips", 0)]
         if pairs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from other_rigs import random_axes, redrawn, sitting
 
 from motionlab import Motion, Skeleton, concatenate, datasets, encodings
 from motionlab.encodings import BodyFrame, JointAngles, RootRelative
@@ -148,6 +150,25 @@ def test_points_to_motion_on_real_skeletons(kind, real_motions):
         again = encoding.to_motion(encoding.encode(motion), encoding.start_of(motion))
         missed = (again.positions() - motion.positions())[:, : encoding.points].norm(dim=-1)
         assert missed.max() < 5e-3, motion.name
+
+
+@pytest.mark.parametrize("kind", [RootRelative, BodyFrame])
+@pytest.mark.parametrize("axes", [sitting, random_axes])
+def test_canonical_names_on_a_rig_with_other_axes_are_no_canonical_body(kind, axes, gait):
+    """So nothing is known of its hinges, nor of its mean pose."""
+    motion = redrawn(gait[:60], axes(gait.skeleton))
+    encoding = kind(motion.skeleton)
+    again = encoding.to_motion(encoding.encode(motion), encoding.start_of(motion))
+    missed = (again.positions() - motion.positions())[:, : encoding.points].norm(dim=-1)
+    assert missed.max() < 5e-3
+    eye = torch.eye(3).double().expand(gait.skeleton.joints, 3, 3)
+    assert torch.equal(JointAngles(motion.skeleton).mean_pose, eye)
+
+
+def test_a_larger_body_with_the_same_axes_is_a_canonical_one():
+    body = Skeleton.canonical()
+    larger = replace(body, offsets=1.2 * body.offsets, end_offsets=1.2 * body.end_offsets)
+    assert torch.equal(JointAngles(larger).mean_pose, JointAngles(body).mean_pose)
 
 
 def test_difference_starts_from_a_height_or_from_the_rest_pose(gait):

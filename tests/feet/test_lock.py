@@ -95,6 +95,15 @@ def test_what_is_locked_stays_as_it_is():
     assert (lock_feet(once, down).positions() - once.positions()).abs().max() < 1e-4
 
 
+@pytest.mark.parametrize("name", ["run_3.0_stop", "walk_0.6", "go_and_halt"])
+def test_where_nothing_slides_labels_by_speed_pull_no_foot_out_of_the_air(name):
+    (motion,) = (clip for clip in gaits.load() if clip.name == name)
+    found = contacts.label(motion)
+    assert (found & ~motion.contacts)[:, TOES].any()
+    moved = lock_feet(motion, found, floor=None).positions() - motion.positions()
+    assert moved.norm(dim=-1).max() < 0.01
+
+
 def test_knees_bend_forward():
     motion, down = sliding(speed=2.8)
     locked = lock_feet(motion, down)

@@ -7,12 +7,13 @@ import roma
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from other_rigs import with_more_joints
 from scipy.optimize import least_squares
 
 from motionlab import Motion, Skeleton, read_bvh, write_bvh
 from motionlab.datasets import gaits
 from motionlab.errors import IkError
-from motionlab.ik import solve, twist_error
+from motionlab.ik import refine, solve, twist_error
 from motionlab.ik.limits import HUMAN, read_limits
 from motionlab.ik.turns import place
 from motionlab.io.bvh import parse_bvh
@@ -114,6 +115,25 @@ def test_joints_alone_are_enough(walk):
     assert gap(walk, found)[:, :joints].max() < 1
     hands = [CANONICAL.index(f"{side}_hand") for side in SIDES]
     torch.testing.assert_close(rotations[:, hands], torch.eye(3).expand(60, 2, 3, 3))  # the prior's
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rig_of_many_joints_is_solved_in_closed_form(walk, seed):
+    """Least squares need not begin, though children in the same place turn by themselves."""
+    source = with_more_joints(walk, 101, seed)
+    assert gap(source, recovered(source, iterations=0)).max() < 0.1
+
+
+def test_frames_that_have_arrived_stop(walk, monkeypatch):
+    source = with_more_joints(walk, 60)
+    start = source.rotations @ roma.rotvec_to_rotmat(0.01 * torch.ones(source.skeleton.joints, 3))
+    frames = []
+    step = refine.tree_step
+    monkeypatch.setattr(
+        refine, "tree_step", lambda *a, **k: (frames.append(len(a[1])), step(*a, **k))[1]
+    )
+    assert gap(source, recovered(source, start=start)).max() < 0.1
+    assert len(frames) < 8 and frames[-1] <= frames[0] == len(walk)
 
 
 def test_batch_equals_loop(walk):

@@ -16,6 +16,8 @@ from ..motion import Motion
 from ..skeleton import Skeleton
 from .path import Start
 
+_ALIKE = 0.9  # cosine between bones at rest that are drawn alike
+
 
 class Encoding(Protocol):
     """Motion to features and back: the contract between data and models.
@@ -177,10 +179,22 @@ def motion_through(
     On the canonical skeleton knees and elbows are hinges, which tells how thighs and upper arms
     turn about themselves; what other skeletons' joints may do is not known.
     """
-    skeleton, canonical = encoding.skeleton, Skeleton.canonical()
-    limits = "human" if skeleton.names == canonical.names else None
+    skeleton = encoding.skeleton
+    limits = "human" if drawn_as_canonical(skeleton) else None
     root_positions, rotations = solve(skeleton, points.cpu(), limits=limits)
     return Motion(skeleton, root_positions, rotations, encoding.fps, name, source, contacts)
+
+
+def drawn_as_canonical(skeleton: Skeleton) -> bool:
+    """Whether a skeleton has the joints of the canonical one, and they lie alike at rest.
+
+    Then a rotation means the same on both, however long the bones are.
+    """
+    canonical = Skeleton.canonical()
+    if (skeleton.names, skeleton.parents) != (canonical.names, canonical.parents):
+        return False
+    pairs = skeleton.offsets[1:], canonical.offsets[1:]
+    return bool(torch.nn.functional.cosine_similarity(*pairs).min() > _ALIKE)
 
 
 def skeleton_config(skeleton: Skeleton) -> dict:

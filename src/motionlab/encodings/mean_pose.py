@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ..errors import EncodingError
 from ..skeleton import Skeleton
+from .base import drawn_as_canonical
 
 _FILE = Path(__file__).with_name("mean_pose.json")  # written by experiments/data/fit_mean_pose.py
 
@@ -20,8 +21,8 @@ _FILE = Path(__file__).with_name("mean_pose.json")  # written by experiments/dat
 @torch.inference_mode(False)
 def mean_pose_of(skeleton: Skeleton) -> Tensor:
     """Local rotations (joints, 3, 3), float64: the mean of the training data for
-    `Skeleton.canonical`, the rest pose for any other skeleton."""
-    if skeleton.names == Skeleton.canonical().names:
+    `Skeleton.canonical` and bodies that are drawn like it, the rest pose for any other."""
+    if drawn_as_canonical(skeleton):
         return _canonical_pose()
     return torch.eye(3, dtype=torch.float64).repeat(skeleton.joints, 1, 1)
 

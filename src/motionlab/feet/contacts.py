@@ -31,6 +31,7 @@ __all__ = [
     "label",
     "label_positions",
     "rest_heights",
+    "stands_on_floor",
     "velocities",
 ]
 
@@ -99,8 +100,8 @@ def label_positions(
 
     Raises
     ------
-    MotionError : wrong shape, no frame, NaN, a rate or threshold that is not positive, or an
-        unknown rule.
+    MotionError : wrong shape, no frame, NaN, a rate or threshold that is not positive, an unknown
+        rule, or a floor for a skeleton whose rest pose does not stand on one.
     SkeletonError : the skeleton has no feet.
     """
     positions = _check(positions, skeleton, fps, rule, speed, height, step, floor)
@@ -112,32 +113,53 @@ def label_positions(
     if floor is None:
         slow = torch.where(found, heights, torch.nan)
         resting = slow.nanmedian(dim=-2, keepdim=True).values  # NaN, so no contact, if never slow
-    else:
+    elif stands_on_floor(skeleton):
         resting = rest_heights(skeleton).to(feet) + floor
+    else:
+        raise MotionError(
+            f"contacts: the rest pose of {skeleton!r} does not stand on the floor y = 0, so how "
+            "high its feet lie on a floor is not known; leave `floor` out, or motion.retarget() "
+            "first."
+        )
     return found & (heights < resting + height)
 
 
 def foot_points(skeleton: Skeleton) -> list[int]:
     """Points of a skeleton that the four channels speak of.
 
-    Where a skeleton has no toe joint, the toe is the end site of the foot, and where that is
+    Where a skeleton has no toe joint, the toe is the foot's farthest end site, and where that is
     missing too, the foot itself.
     """
     found = []
     for side in ("left", "right"):
         foot = skeleton.role(f"{side}_foot")
-        ends = [skeleton.joints + i for i, p in enumerate(skeleton.end_parents) if p == foot]
-        found += [foot, skeleton.roles.get(f"{side}_toes", ends[0] if ends else foot)]
+        ends = [i for i, parent in enumerate(skeleton.end_parents) if parent == foot]
+        tip = max(ends, key=lambda end: skeleton.end_offsets[end].norm(), default=None)
+        toe = foot if tip is None else skeleton.joints + tip
+        found += [foot, skeleton.roles.get(f"{side}_toes", toe)]
     return found
 
 
 def rest_heights(skeleton: Skeleton) -> Tensor:
     """Heights (4,) in metres of heels and toes above the floor y = 0 in the rest pose."""
-    heights = [0.0] * skeleton.points
-    offsets = torch.cat([skeleton.offsets, skeleton.end_offsets])[:, 1].tolist()
-    for point, parent in enumerate(skeleton.point_parents):
-        heights[point] = offsets[point] + (heights[parent] if parent >= 0 else 0.0)
-    return torch.tensor([heights[point] for point in foot_points(skeleton)])
+    return skeleton.rest_points[foot_points(skeleton), 1] + skeleton.offsets[0, 1]
+
+
+def stands_on_floor(skeleton: Skeleton) -> bool:
+    """Whether the rest pose stands on the floor y = 0, feet flat, so that `rest_heights` are theirs.
+
+    Many files have a rest pose that floats, hangs from its root at the origin, or lies: heights
+    would be wrong by a metre.
+    """
+    heights, rest = rest_heights(skeleton), skeleton.rest_points
+    feet = foot_points(skeleton)
+    shank = skeleton.offsets[feet[0]].norm()
+    for foot, toe in (feet[:2], feet[2:]):
+        hangs = rest[skeleton.point_parents[foot], 1] - rest[foot, 1] > 0.8 * shank
+        tiptoe = rest[foot, 1] - rest[toe, 1] > 0.9 * (rest[foot] - rest[toe]).norm()
+        if tiptoe or not hangs:
+            return False
+    return bool(-0.05 * shank < heights.min() and heights.max() < 0.6 * shank)
 
 
 def foot_speeds(feet: Tensor, fps: float, step: float = 1 / 30) -> Tensor:

@@ -2,7 +2,7 @@
 
 A toe that is in contact is held at one place of the floor, the leg is bent to reach it, and before
 and after each contact the foot eases from and to where it was. All clips of a batch, all frames and
-both feet are worked on at once.
+both feet are worked on at once. On any rig: what is known of its legs comes from `legs`.
 """
 
 from __future__ import annotations
@@ -20,18 +20,17 @@ from ..ik.turns import shortest_turn
 from ..kinematics import forward_kinematics
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .contacts import foot_points, rest_heights
+from .legs import PARTS, flat_toes, knee_fronts, leg_joints, leg_lengths
 from .planting import off_the_floor, steps
 
-SIDES = ("left", "right")
-PARTS = ("upper_leg", "lower_leg", "foot", "toes")
 GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
 FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, whatever its label
 FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
+RESTS = 0.005  # m/s; a toe that is slower is still, and slides nowhere
 BLEND = 0.25  # seconds from a foot's own way to where it is held
 REACH = 0.97  # share of its length to which a leg may be stretched; near 1 knees snap
 NEAR = 0.04  # metres that a foot may be moved while its leg stays as straight as it was
-STRAIGHT = 0.02  # metres that a knee lies beside its leg; if less, the thigh says where it points
+STRAIGHT = 0.02  # metres that a knee lies beside its leg; if less, its front says where it points
 SETTLE = 0.15  # seconds over which the body comes down if a leg is too short
 
 
@@ -48,7 +47,8 @@ def lock_feet(
     ----------
     motion : with feet, toes and legs that its skeleton names.
     contacts : bool (frames, 2), left and right toe; or (frames, 4) as of a Motion, whose toes are
-        taken. None: the motion's own.
+        taken. None: the motion's own. Where a toe is still for most of a contact, it is held from
+        the first to the last frame in which it is.
     floor : height of the floor in metres. None: where toes lie while they are in contact.
     blend : seconds over which a foot eases into a contact, and out of it.
 
@@ -60,7 +60,7 @@ def lock_feet(
     Raises
     ------
     ModelError : contacts of another shape or kind, or none, a blend or floor that is no number.
-    SkeletonError : the skeleton lacks a joint of a leg.
+    SkeletonError : the skeleton lacks a joint of a leg, or its legs do not hang together.
     """
     contacts = motion.contacts if contacts is None else contacts
     if contacts is None:
@@ -96,20 +96,23 @@ def lock(
     root_positions and rotations like those given.
     """
     contacts = _checked(contacts, root_positions, floor, blend, fps)
-    joints = _legs(skeleton)
+    joints = leg_joints(skeleton)
     points, world = _forward(skeleton, root_positions, rotations)
     toes = points[..., joints["toes"], :]  # (..., frames, 2, 3)
     held = _clean(contacts & (steps(toes) * fps < FASTEST), fps)
-    ground = _ground(toes, held, _toe_heights(skeleton).to(toes), floor)
+    held = _resting(held, steps(toes) * fps < RESTS)
+    flat = flat_toes(skeleton, points, held)
+    ground = _ground(toes, held, flat, floor)
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
         held = held & (_onto_places(toes, held, ground).norm(dim=-1) < FARTHEST)
     shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
-    shift = _above(shift, points, joints, ground, skeleton)
+    shift = _above(shift, points, joints, ground, ground - flat)
     ankle = points[..., joints["foot"], :] + shift
 
     sunk = root_positions - _sink(points, ankle, joints, fps)
     hips = points[..., joints["upper_leg"], :] + (sunk - root_positions)[..., None, :]
-    return sunk, _bent(skeleton, joints, points, world, rotations, hips, ankle, shift, ground)
+    toe_heights = toes[..., 1] + shift[..., 1] - (ground - flat)[..., None, :]
+    return sunk, _bent(skeleton, joints, points, world, rotations, hips, ankle, toe_heights)
 
 
 # -- where feet are to be ---------------------------------------------------------------------------
@@ -132,6 +135,29 @@ def _opened(marks: Tensor, most: int) -> Tensor:
     return ~_closed(~marks, most)
 
 
+def _resting(held: Tensor, still: Tensor) -> Tensor:
+    """Contacts (..., frames, 2) in most of which a toe is still: from its first rest to its last.
+
+    Labels by speed begin and end in the air. Where nothing slides, nothing is to be held there.
+    """
+    number, rests = _numbered(held), held & still
+    frames = torch.arange(held.shape[-2], device=held.device)[:, None].expand_as(number)
+    none = torch.zeros_like(torch.cat([number[..., :1, :], number], dim=-2))
+    most = none.scatter_add(-2, number, 2 * rests - held.long()) > 0
+    first = none.scatter_reduce(
+        -2, number, torch.where(rests, frames, held.shape[-2]), "amin", include_self=False
+    )
+    last = none.scatter_reduce(-2, number, torch.where(rests, frames, -1), "amax")
+    within = (frames >= first.gather(-2, number)) & (frames <= last.gather(-2, number))
+    return held & (within | ~most.gather(-2, number))
+
+
+def _numbered(held: Tensor) -> Tensor:
+    """Which contact each frame (..., frames, 2) belongs to, from 1; 0 where there is none."""
+    begins = held & ~torch.cat([torch.zeros_like(held[..., :1, :]), held[..., :-1, :]], dim=-2)
+    return begins.long().cumsum(-2) * held
+
+
 def _distance(marks: Tensor, before: bool) -> Tensor:
     """Frames (..., frames, 2) from each frame to the last mark before it (or the next after it)."""
     frames = torch.arange(marks.shape[-2], device=marks.device)[:, None]
@@ -142,17 +168,10 @@ def _distance(marks: Tensor, before: bool) -> Tensor:
     return following - frames
 
 
-def _toe_heights(skeleton: Skeleton) -> Tensor:
-    """Heights (2,) of toe joints above the floor when a foot stands flat."""
-    heights = rest_heights(skeleton)
-    # many a rest pose hangs from a root at the origin: its lowest foot joint stands, then
-    return heights[[1, 3]] - heights.amin().clamp(max=0)
-
-
-def _ground(toes: Tensor, held: Tensor, rest: Tensor, floor: float | None) -> Tensor:
+def _ground(toes: Tensor, held: Tensor, flat: Tensor, floor: float | None) -> Tensor:
     """Heights (..., 2) of resting toe joints: the plane of contact."""
     if floor is not None:
-        return (rest + floor).expand(*toes.shape[:-3], 2)
+        return (flat + floor).expand(*toes.shape[:-3], 2)
     heights = torch.where(held, toes[..., 1], torch.nan)
     return torch.nan_to_num(heights.nanmedian(-2).values, nan=0.0)
 
@@ -162,9 +181,7 @@ def _onto_places(toes: Tensor, held: Tensor, ground: Tensor) -> Tensor:
 
     A place is where a toe joint is on average over one contact, on the ground.
     """
-    begins = held & ~torch.cat([torch.zeros_like(held[..., :1, :]), held[..., :-1, :]], dim=-2)
-    number = begins.long().cumsum(-2) * held  # which contact, from 1; 0 where there is none
-    index = number[..., None].expand_as(toes)
+    index = _numbered(held)[..., None].expand_as(toes)
     none = toes.new_zeros(*toes.shape[:-3], toes.shape[-3] + 1, 2, 3)
     sums = none.scatter_add(-3, index, toes)
     counts = none.scatter_add(-3, index, torch.ones_like(toes))
@@ -194,12 +211,10 @@ def _fading(distance: Tensor, blend: float) -> Tensor:
     return left * left * (3 - 2 * left)
 
 
-def _above(shift: Tensor, points: Tensor, joints: dict, ground: Tensor, skeleton: Skeleton):
+def _above(shift: Tensor, points: Tensor, joints: dict, ground: Tensor, floor: Tensor) -> Tensor:
     """The shift, with feet lifted where they would be in the floor: ankles and toe joints."""
-    rest = _toe_heights(skeleton).to(points)
-    floor = (ground - rest)[..., None, :]  # (..., 1, 2)
     toe = points[..., joints["toes"], 1] + shift[..., 1] - ground[..., None, :]
-    ankle = points[..., joints["foot"], 1] + shift[..., 1] - floor
+    ankle = points[..., joints["foot"], 1] + shift[..., 1] - floor[..., None, :]
     lift = -torch.minimum(toe, ankle).clamp(max=0)
     return shift + torch.stack([torch.zeros_like(lift), lift, torch.zeros_like(lift)], dim=-1)
 
@@ -237,69 +252,70 @@ def _smoothed_over(values: Tensor, sigma: float) -> Tensor:
 
 def _bent(
     skeleton: Skeleton, joints: dict, points: Tensor, world: Tensor, rotations: Tensor,
-    hips: Tensor, ankle: Tensor, shift: Tensor, ground: Tensor,
+    hips: Tensor, ankle: Tensor, toe_heights: Tensor,
 ) -> Tensor:  # fmt: skip
     """Local rotations with legs that reach their ankles; feet keep the way they point."""
     rotations = rotations.clone()
-    for i, side in enumerate(SIDES):
+    fronts, lengths = knee_fronts(skeleton, points, world), leg_lengths(skeleton, points)
+    for i in range(2):
         upper, lower, foot, toes = (joints[part][i] for part in PARTS)
         knee_was = points[..., lower, :] - points[..., upper, :]
-        offsets = [
-            skeleton.below(f"{side}_{a}", f"{side}_{b}").to(points)
-            for a, b in (("upper_leg", "lower_leg"), ("lower_leg", "foot"))
-        ]
-        ahead = _knee_direction(points, world, upper, lower, foot)
+        shin_was = points[..., foot, :] - points[..., lower, :]
+        # of legs that hang straight down at rest, whatever those of this rig do
+        offsets = [length * points.new_tensor([0.0, -1.0, 0.0]) for length in lengths[:, i]]
+        ahead = _knee_direction(knee_was, knee_was + shin_was, fronts[..., i, :])
         thigh, shank = two_bone(hips[..., i, :], ankle[..., i, :], ahead, *offsets)
         knee = thigh @ offsets[0]
         shin = thigh @ shank @ offsets[1]
         # the smallest turns of the bones as they were, so that no bone is twisted
         turned = {
             upper: shortest_turn(knee_was, knee) @ world[..., upper, :, :],
-            lower: shortest_turn(points[..., foot, :] - points[..., lower, :], shin)
-            @ world[..., lower, :, :],
+            lower: shortest_turn(shin_was, shin) @ world[..., lower, :, :],
             foot: world[..., foot, :, :],
         }
         if foot != toes < skeleton.joints:  # a joint, not the end of the foot
-            turned[toes] = _toes_up(skeleton, side, points, world, shift, ground, toes, i)
+            turned[toes] = _toes_up(skeleton, toes, world, toe_heights[..., i])
         for joint, whole in turned.items():
-            parent = skeleton.parents[joint]
-            above = turned.get(parent, world[..., parent, :, :])
+            above = _carried(skeleton, skeleton.parents[joint], turned, world)
             rotations[..., joint, :, :] = above.mT @ whole
     return rotations
 
 
-def _toes_up(skeleton, side, points, world, shift, ground, toes, i) -> Tensor:
-    """World orientation of the toes, pitched up where their tip would be in the floor."""
+def _carried(skeleton: Skeleton, joint: int, turned: dict[int, Tensor], world: Tensor) -> Tensor:
+    """World orientation of a joint that goes along with the nearest one above it that was turned.
+
+    Some rigs have joints between those of a leg, which spread its twist.
+    """
+    above = joint
+    while above >= 0 and above not in turned:
+        above = skeleton.parents[above]
+    if above < 0 or above == joint:
+        return turned.get(joint, world[..., joint, :, :])
+    return turned[above] @ world[..., above, :, :].mT @ world[..., joint, :, :]
+
+
+def _toes_up(skeleton: Skeleton, toes: int, world: Tensor, heights: Tensor) -> Tensor:
+    """World orientation of toes, pitched up where their tip would be in the floor.
+
+    heights : (..., frames) metres of the toe joint above the floor.
+    """
     ends = zip(skeleton.end_parents, skeleton.end_offsets, strict=True)
     tip = next((offset for parent, offset in ends if parent == toes), torch.zeros(3))
-    rest = _toe_heights(skeleton)[i].to(points)
-    height = points[..., toes, 1] + shift[..., i, 1] - (ground[..., i] - rest)[..., None]
-    flat = world[..., toes, :, :].reshape(-1, 3, 3)
-    return off_the_floor(flat, height.reshape(-1), tip.to(flat)).reshape(
-        world[..., toes, :, :].shape
-    )
+    was = world[..., toes, :, :]
+    return off_the_floor(was.reshape(-1, 3, 3), heights.reshape(-1), tip.to(was)).reshape(was.shape)
 
 
-def _knee_direction(points: Tensor, world: Tensor, upper: int, lower: int, foot: int) -> Tensor:
+def _knee_direction(knee: Tensor, ankle: Tensor, front: Tensor) -> Tensor:
     """Which way a knee points (..., 3): where it is beside the line from hip to ankle.
 
-    Where the leg is nearly straight, that is where the thigh's front is.
+    Where the leg is nearly straight, that is where its front is. All are seen from the hip.
     """
-    line = points[..., foot, :] - points[..., upper, :]
-    line = line / line.norm(dim=-1, keepdim=True).clamp(min=1e-9)
-    aside = points[..., lower, :] - points[..., upper, :]
-    aside = aside - (aside * line).sum(-1, keepdim=True) * line
-    front = world[..., upper, :, 2]
+    line = ankle / ankle.norm(dim=-1, keepdim=True).clamp(min=1e-9)
+    aside = knee - (knee * line).sum(-1, keepdim=True) * line
     front = front - (front * line).sum(-1, keepdim=True) * line
     backwards = (aside * front).sum(-1, keepdim=True) < 0
     aside = torch.where(backwards, torch.zeros_like(aside), aside)
     return aside + (STRAIGHT - aside.norm(dim=-1, keepdim=True)).clamp(min=0) * front
-
-
-def _legs(skeleton: Skeleton) -> dict[str, list[int]]:
-    """Joints of both legs, left first: {part: [left, right]}; toes as `contacts.foot_points`."""
-    joints = {part: [skeleton.role(f"{s}_{part}") for s in SIDES] for part in PARTS[:3]}
-    return joints | {"toes": [foot_points(skeleton)[1], foot_points(skeleton)[3]]}
 
 
 def _forward(skeleton: Skeleton, root_positions: Tensor, rotations: Tensor):

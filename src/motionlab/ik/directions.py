@@ -30,23 +30,29 @@ class Bone(NamedTuple):
 
     point: int
     offset: Tensor  # (3,) metres, in the joint's frame
+    own: bool = True  # or passed on by a child in the same place
 
 
 def leaving_bones(skeleton: Skeleton, neutral: Tensor) -> list[list[Bone]]:
     """The bones that leave each joint; a child in the same place passes on its own.
 
-    The CMU skeletons have such children: hip joints that lie in the middle of the hips.
+    The CMU skeletons have such children: hip joints that lie in the middle of the hips. As these
+    may turn by themselves, they are asked only where a joint's own bones leave its turn open.
     """
     offsets = torch.cat([skeleton.offsets, skeleton.end_offsets]).to(neutral)
     found: list[list[Bone]] = [[] for _ in skeleton.names]
-    for point in range(skeleton.points - 1, 0, -1):  # children before parents
-        parent = skeleton.point_parents[point]
+    passed: list[list[Bone]] = [[] for _ in skeleton.names]
+    for point, parent in reversed([*enumerate(skeleton.point_parents)]):  # children before parents
+        if point < skeleton.joints and not _show_orientation(found[point]):
+            found[point] = passed[point] + found[point]
+        if parent < 0:
+            break
         if offsets[point].norm() > SHORT:
             found[parent].insert(0, Bone(point, offsets[point]))
         elif point < skeleton.joints:
             # except a fingertip: it says nothing of the hand
-            passed = [bone for bone in found[point] if bone.point < skeleton.joints]
-            found[parent][:0] = [Bone(b.point, neutral[point] @ b.offset) for b in passed]
+            bones = [bone for bone in found[point] if bone.point < skeleton.joints]
+            passed[parent][:0] = [Bone(b.point, neutral[point] @ b.offset, False) for b in bones]
     return found
 
 
@@ -97,7 +103,7 @@ def first_pose(
             seen[lower] = seen[lower] + (1 - seen[lower]) * seen[end]
         ways = [
             seen[point] * unit(targets[point] - here) + (1 - seen[point]) * unit(pose @ offset)
-            for point, offset in leaving[joint]
+            for point, offset, _ in leaving[joint]
         ]
         if joint in bending:
             pose = bending[joint].bend_to(world[parent], pose, ways[0])
@@ -105,6 +111,10 @@ def first_pose(
             pose = swing(pose @ leaving[joint][0].offset, ways[0]) @ pose
         elif ways:
             pose = _procrustes(ways, leaving[joint], pose)
+            own = [pair for pair in zip(leaving[joint], ways, strict=True) if pair[0].own]
+            if 0 < len(own) < len(ways):  # they point their way whatever the children do
+                bone, way = max(own, key=lambda pair: pair[0].offset.norm())
+                pose = swing(pose @ bone.offset, way) @ pose
         if hinge:
             below = seen[lower] * seen[end] * unit(targets[end] - targets[lower])
             pose = hinge.twist_above(pose, unit(pose @ offsets[lower]), below, smooth)

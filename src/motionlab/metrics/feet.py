@@ -14,7 +14,7 @@ from __future__ import annotations
 from torch import Tensor
 
 from ..errors import MetricError
-from ..feet.contacts import foot_points, rest_heights
+from ..feet.contacts import foot_points, rest_heights, stands_on_floor
 from ..skeleton import Skeleton
 from .checks import check_contacts, check_frames, check_positive, check_rate, check_skeleton
 
@@ -178,9 +178,7 @@ def _clearance(positions: Tensor, skeleton: Skeleton, floor: float) -> Tensor:
     """Height (..., frames, 4) of heels and toes above where they lie in a foot that stands flat."""
     feet = _feet(positions, skeleton)
     flat = rest_heights(skeleton)
-    # Many files have a rest pose that floats, or lies down: heights would be wrong by a metre.
-    size = float(skeleton.offsets[foot_points(skeleton)[0]].norm())  # of the shank
-    if not -0.05 * size < float(flat.min()) <= float(flat.max()) < 0.6 * size:
+    if not stands_on_floor(skeleton):
         raise MetricError(
             f"The rest pose of {skeleton!r} does not stand on the floor y = 0: there its feet lie "
             f"{100 * flat.min():.0f} to {100 * flat.max():.0f} cm high. Heights of feet can't be "

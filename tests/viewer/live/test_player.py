@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -240,6 +241,28 @@ def test_the_canonical_body_has_every_part():
     assert abs(crown - pose[:, 1].max()) < 0.01  # where the skeleton has the top of the head
     left, right = CANONICAL.index("left_foot"), CANONICAL.index("right_foot")
     assert pose[dress.feet[0], 1] < pose[left, 1] and pose[dress.feet[2], 1] < pose[right, 1]
+
+
+@pytest.mark.parametrize("whole", [CANONICAL, CANONICAL.without_end_sites()])
+def test_a_head_without_a_neck_has_its_skull(whole):
+    necks = replace(whole, roles={"neck": ""}), whole
+    assert "neck" not in necks[0].roles
+    skulls = []
+    for skeleton in necks:
+        dress = body(skeleton)
+        points = dress.points(standing(1, skeleton=skeleton).positions())[0]
+        skulls.append(points[list(dress.bones[dress.head][:2])])
+    torch.testing.assert_close(*skulls, rtol=0, atol=1e-4)
+
+
+def test_a_head_on_top_of_its_neck_has_a_skull_above_the_spine():
+    offsets = CANONICAL.offsets.clone()
+    offsets[CANONICAL.role("head")] = 0
+    skeleton = replace(CANONICAL.without_end_sites(), offsets=offsets, roles={"neck": ""})
+    dress = body(skeleton)
+    points = dress.points(standing(1, skeleton=skeleton).positions())[0]
+    jaw, crown = points[list(dress.bones[dress.head][:2]), 1] - points[skeleton.role("head"), 1]
+    assert 0.03 < jaw < crown < 0.15
 
 
 def test_a_body_scales_with_its_skeleton():

@@ -16,6 +16,7 @@ from motionlab.viewer import filmstrip, stack, still, video
 from motionlab.viewer.pictures import probe as probe_
 from motionlab.viewer.pictures.picture import Camera, Figure, Floor, Picture, capsules, unit
 from motionlab.viewer.pictures.stills import open_painter
+from motionlab.viewer.pictures.take import Take
 
 BACKENDS = ["matplotlib", "vtk"]
 
@@ -145,6 +146,33 @@ def test_a_body_far_from_the_origin_makes_the_same_strip(backend):
     assert abs(solid(near).mean() - solid(far).mean()) < 0.002
 
 
+def scaled(motion: Motion, factor: float) -> Motion:
+    body = motion.skeleton
+    small = replace(body, offsets=factor * body.offsets, end_offsets=factor * body.end_offsets)
+    return replace(motion, skeleton=small, root_positions=factor * motion.root_positions)
+
+
+@pytest.mark.parametrize("factor", [0.05, 0.001])
+def test_metres_read_as_centimetres_make_the_same_picture(factor):
+    """Not one bone of such a body is 8 mm long; how large it is, the lines on the floor tell."""
+    small = scaled(stroll(), factor)
+    bodies = [solid(still(motion, backend="matplotlib")) for motion in (stroll(), small)]
+    assert (bodies[0] & bodies[1]).sum() / (bodies[0] | bodies[1]).sum() > 0.95
+    large, small = Take.of(stroll()), Take.of(small)
+    assert (large.grid, large.body.magnified) == (0.5, 1)
+    assert small.grid / small.height == pytest.approx(0.5 / (factor * large.height), rel=1e-3)
+
+
+def test_a_hand_alone_is_seen():
+    names = ("Wrist", "Thumb1", "Thumb2", "Index1", "Index2")
+    offsets = 1e-4 * torch.tensor([[0, 0, 0], [8, 0, 2], [3, 0, 0], [8, 0, -2], [3, 0, 0]])
+    hand = Skeleton(names, (-1, 0, 1, 0, 3), offsets, (2, 4), 2e-4 * torch.eye(3)[[0, 0]])
+    turns = torch.eye(3).expand(2, 5, 3, 3)
+    motion = Motion(hand, torch.tensor([[0.0, 0.01, 0.0]]).expand(2, 3), turns, 30)
+    for image in (still(motion), filmstrip(motion, 2, width=300)):
+        assert solid(image).mean() > 0.02
+
+
 def test_labels_add_a_band_with_text():
     motion = stroll(speed=0.0)
     plain = filmstrip(motion, 3, labels=False, backend="matplotlib")
@@ -223,6 +251,7 @@ def test_video(tmp_path):
         (lambda m: filmstrip(m, 2.5), "2.5 bodies"),
         (lambda m: still(m, 1.5), "frame 1.5 is not a whole number"),
         (lambda m: still([m, m]), "one motion at a time"),
+        (lambda m: still(scaled(m, 0.0)), "no bone with a length"),
         (lambda m: still(m, color="blu"), "^color: 'blu'"),
     ],
 )

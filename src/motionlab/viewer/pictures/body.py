@@ -18,6 +18,8 @@ from torch import Tensor
 SIDES = ("left", "right")
 LEG_LENGTH = 0.85  # metres from hip to ankle, of the adult whose radii are written below
 SHORTEST = 0.008  # metres; shorter bones are drawn by their neighbours' round ends
+# Metres from the root to its farthest tip: a smaller body is dressed, and drawn, as if this large.
+SMALLEST, SHOWN = 0.1, 1.0
 
 # Radii in metres (at the joint, at its child) of the bones that start at a joint of this role.
 LIMBS = {
@@ -58,13 +60,16 @@ class Body:
     """Bones over the skeleton's points followed by the extra points.
 
     ``head`` is the index, within ``bones``, of the skull (None if no head was recognised);
-    ``feet`` the points to mark for the contacts left heel, left toe, right heel, right toe.
+    ``feet`` the points to mark for the contacts left heel, left toe, right heel, right toe;
+    ``magnified`` how many times larger a picture shows a body that is too small for one, such as
+    metres read as centimetres; 1 for all others.
     """
 
     extras: tuple[ExtraPoint, ...]
     bones: tuple[Bone, ...]
     head: int | None
     feet: tuple[int, ...]
+    magnified: float = 1.0
 
     def points(self, positions: Tensor) -> Tensor:
         """Append the extra points: (..., points, 3) -> (..., points + extras, 3), metres."""
@@ -85,8 +90,9 @@ class _Tailor:
     def __init__(self, skeleton):
         self.roles = dict(skeleton.roles)
         self.parents = list(skeleton.point_parents)
-        lengths = [offset.norm().item() for offset in skeleton.offsets]
-        self.lengths = lengths + [offset.norm().item() for offset in skeleton.end_offsets]
+        offsets = torch.cat([skeleton.offsets, skeleton.end_offsets])
+        self.lengths = [offset.norm().item() for offset in offsets]
+        self.magnified = self._magnify()
         self.names = [name.lower() for name in skeleton.point_names]
         self.role_of = {joint: role for role, joint in self.roles.items()}
         self.children: list[list[int]] = [[] for _ in self.parents]
@@ -106,7 +112,8 @@ class _Tailor:
         self._torso()
         self._hands()
         feet, head = self._feet(), self._head()
-        return Body(tuple(self.extras), tuple(self.bones), head, feet)
+        bones = (Bone(a, b, *(r / self.magnified for r in radii)) for a, b, *radii in self.bones)
+        return Body(tuple(self.extras), tuple(bones), head, feet, self.magnified)
 
     def _limb(self, parent: int, point: int) -> None:
         role = self._nearest_role(parent)
@@ -188,8 +195,13 @@ class _Tailor:
         return tuple(marks)
 
     def _head(self) -> int | None:
-        head, neck = self.roles.get("head"), self.roles.get("neck")
-        if head is None or neck is None or head == neck:
+        head = self.roles.get("head")
+        if head is None:
+            return None
+        # without a neck, the skull goes on from whatever carries the head
+        below = [p for p in self._ancestors(head)[1:] if self._distance(p, head) > SHORTEST]
+        neck = self.roles.get("neck", next(iter(below), None))
+        if neck is None:
             return None
         tops = [
             p for p in self.children[head] if self.lengths[p] > 0.07 and "eye" not in self.names[p]
@@ -231,11 +243,22 @@ class _Tailor:
         knee, foot = self.roles.get("left_lower_leg"), self.roles.get("left_foot")
         if knee is not None and foot is not None:
             return max(self.lengths[knee] + self._distance(knee, foot), SHORTEST)
-        longest = [0.0] * len(self.parents)
+        return max(self._farthest(), SHORTEST)
+
+    def _farthest(self) -> float:
+        """How far the farthest tip is from the root, along the bones."""
+        along = [0.0] * len(self.parents)
         for point, parent in enumerate(self.parents):
             if parent >= 0:
-                longest[point] = longest[parent] + self.lengths[point]
-        return max(*longest, SHORTEST)
+                along[point] = along[parent] + self.lengths[point]
+        return max(along)
+
+    def _magnify(self) -> float:
+        """Make `lengths` those of a body that is large enough to be dressed; how many times."""
+        farthest = self._farthest()
+        times = SHOWN / farthest if 0 < farthest < SMALLEST else 1.0
+        self.lengths = [times * length for length in self.lengths]
+        return times
 
     def _ancestors(self, point: int) -> list[int]:
         line = [point]

@@ -98,6 +98,7 @@ class Floor:
     center: np.ndarray  # (3,)
     along: np.ndarray  # (3,), horizontal
     half: tuple[float, float]  # metres from the centre to the rim, along and across
+    grid: float = GRID  # metres between its lines
 
     @property
     def across(self) -> np.ndarray:
@@ -224,7 +225,8 @@ def floor_image(picture: Picture) -> np.ndarray:
     fade = _smooth(1.0, 0.45, beyond)
     origin = floor.center @ floor.along, floor.center @ floor.across
     lines = np.maximum(
-        _line(u + np.float32(origin[0]), cell), _line(v + np.float32(origin[1]), cell)
+        _line(u + np.float32(origin[0]), floor.grid, cell),
+        _line(v + np.float32(origin[1]), floor.grid, cell),
     )
     cover = fade * np.maximum(0.10, 0.42 * lines)
     dark = _enlarge(shadow(picture), u.shape) * fade
@@ -276,8 +278,8 @@ def _cells(floor: Floor, cell: float) -> tuple[np.ndarray, np.ndarray]:
     return np.meshgrid(u * np.float32(floor.half[0]), v * np.float32(floor.half[1]))
 
 
-def _line(metres: np.ndarray, cell: float) -> np.ndarray:
-    away = np.abs((metres / GRID + 0.5) % 1 - 0.5) * GRID
+def _line(metres: np.ndarray, grid: float, cell: float) -> np.ndarray:
+    away = np.abs((metres / grid + 0.5) % 1 - 0.5) * grid
     return _smooth(max(0.014, cell), 0.004, away)
 
 

@@ -49,7 +49,8 @@ def still(
 
     Parameters
     ----------
-    motion : a Motion, or positions (frames, points, 3) in metres with ``skeleton``.
+    motion : a Motion, or positions (frames, points, 3) in metres with ``skeleton``. A body whose
+        bones reach less than 10 cm far is magnified, its floor with it.
     frame : which one; negative counts from the end.
     size : width and height in pixels.
     view : "three-quarter", "side", "front" (all relative to where the body faces) or "top".
@@ -71,7 +72,7 @@ def still(
     shown = np.concatenate([take.hull(figure), below + room])
     camera = Camera(below, direction(view, take.facing[frame]), take.height)
     camera = camera.fitted(shown, size[0] / size[1])
-    floor = Floor(below, Z, (1.1 * take.height, 1.1 * take.height))
+    floor = Floor(below, Z, (1.1 * take.height, 1.1 * take.height), take.grid)
     return _draw(Picture([figure], floor, camera, size), backend)
 
 
@@ -119,6 +120,7 @@ def filmstrip(
         take.on_floor(roots.mean(axis=0)),
         right,
         (camera.height * width / height / 2, 0.62 * take.height),
+        take.grid,
     )
     image = _draw(Picture(figures, floor, camera, (width, height)), backend)
     if not labels:
@@ -193,7 +195,7 @@ def video(
     with open_painter(size, backend) as paint, _writer(path, rate, size) as write:
         for frame in tqdm(moments, desc=path.name, disable=not progress):
             moved = replace(camera, target=camera.target + way[frame] - way[0])
-            floor = Floor(way[frame], Z, (1.7 * take.height, 1.7 * take.height))
+            floor = Floor(way[frame], Z, (1.7 * take.height, 1.7 * take.height), take.grid)
             drawn = paint(Picture([take.figure(frame)], floor, moved, size))
             write(Image.alpha_composite(paper, Image.fromarray(drawn)).convert("RGB"))
     return path

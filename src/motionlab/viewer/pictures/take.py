@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter1d
 from ...errors import ViewerError
 from . import palette
 from .body import Body, body
-from .picture import UP, Figure, capsules, unit
+from .picture import GRID, UP, Figure, capsules, unit
 
 FLOOR_SLACK = 0.15  # metres, as in the player
 FOLLOW_SECONDS = 0.5  # the following camera ignores what is quicker
@@ -42,7 +42,10 @@ def _rate(fps: float) -> float:
 
 @dataclass(frozen=True)
 class Take:
-    """Positions (frames, points, 3) in metres: the skeleton's points, then the body's extras."""
+    """Positions (frames, points, 3) in metres: the skeleton's points, then the body's extras.
+
+    A body that is too small for a picture is magnified (`Body.magnified`), and its way with it.
+    """
 
     positions: np.ndarray
     fps: float
@@ -83,8 +86,12 @@ class Take:
                 "or leave contacts=False."
             )
         dress = body(skeleton)
+        if not (dress.bones and torch.cat([skeleton.offsets[1:], skeleton.end_offsets]).any()):
+            raise ViewerError(
+                f"{skeleton!r} has no bone with a length, so there is no body to draw."
+            )
         return cls(
-            positions=dress.points(places).double().numpy(),
+            positions=dress.magnified * dress.points(places).double().numpy(),
             fps=float(motion.fps if is_motion else fps or 30.0),
             body=dress,
             roles=dict(skeleton.roles),
@@ -111,7 +118,13 @@ class Take:
 
     @cached_property
     def bones(self) -> np.ndarray:
-        return np.array([tuple(bone) for bone in self.body.bones], dtype=np.float64)
+        """Capsules (bones, 4): points a and b, radii there in metres."""
+        return np.array(self.body.bones) * [1, 1, self.body.magnified, self.body.magnified]
+
+    @property
+    def grid(self) -> float:
+        """Metres of the picture between the lines of the floor, which are 0.5 m apart."""
+        return GRID * self.body.magnified
 
     def figure(self, frame: int) -> Figure:
         """The body at a frame, its feet marked where they are down."""
@@ -150,7 +163,7 @@ class Take:
         """
         low = self.positions[:, self.bones[:, :2].astype(int), 1] - self.bones[:, 2:]
         sole = float(np.quantile(low.min(axis=(1, 2)), 0.02))
-        return sole if abs(sole) < FLOOR_SLACK else 0.0
+        return sole if abs(sole) < FLOOR_SLACK * self.body.magnified else 0.0
 
     @cached_property
     def height(self) -> float:
