@@ -16,9 +16,7 @@ import torch
 import tyro
 from interleaved import medians, save, table, verdict
 
-from motionlab import Motion
 from motionlab.datasets import files, loader, locomotion, registry
-from motionlab.io.bvh import parse_bvh
 
 LIMIT = 15 * 60  # seconds for all clips
 
@@ -30,11 +28,6 @@ class Options:
     save: bool = False
 
 
-def read(clip: registry.Clip, data: bytes) -> Motion:
-    units = registry.sources()[clip.source].units
-    return parse_bvh(data, clip.path, units=units, fps=clip.fps, source=clip.source)[clip.skip :]
-
-
 def main(options: Options) -> None:
     torch.set_num_threads(1)
     by_source = defaultdict(list)
@@ -44,12 +37,12 @@ def main(options: Options) -> None:
     numbers = {}
     for source, clips in by_source.items():
         sample = clips[:: options.every]
-        contents = [(clip, data) for clip, data in files.read(sample)]
-        motions = [read(clip, data) for clip, data in contents]
+        contents = list(files.read(sample))
+        motions = [loader.parse(clip, *data) for clip, data in contents]
         stance = loader.stance(source)
         seconds = medians(
             {
-                "reading": lambda c=contents: [read(clip, data) for clip, data in c],
+                "reading": lambda c=contents: [loader.parse(clip, *data) for clip, data in c],
                 "retargeting": lambda m=motions, s=stance: [
                     locomotion.bring(motion, s) for motion in m
                 ],

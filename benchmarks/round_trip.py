@@ -15,20 +15,18 @@ import torch
 from tqdm import tqdm
 
 import motionlab
-from motionlab.datasets import files, registry
-from motionlab.io.bvh import parse_bvh
+from motionlab.datasets import files, loader, registry
 
 ALLOWED = 1e-4  # metres
 
 
-def error(clip: registry.Clip, data: bytes, folder: Path) -> float:
+def error(first: motionlab.Motion, folder: Path) -> float:
     """Largest distance in metres of any point in any frame, first reading to second."""
-    first = parse_bvh(data, clip.path, units=registry.sources()[clip.source].units, fps=clip.fps)
     path = folder / "clip.bvh"
     motionlab.write_bvh(first, path)
     second = motionlab.read_bvh(path)
-    assert second.skeleton.point_names == first.skeleton.point_names, clip.path
-    assert abs(second.fps - first.fps) < 1e-3, (clip.path, first.fps, second.fps)
+    assert second.skeleton.point_names == first.skeleton.point_names, first.name
+    assert abs(second.fps - first.fps) < 1e-3, (first.name, first.fps, second.fps)
     return float((first.positions() - second.positions()).norm(dim=-1).max())
 
 
@@ -39,7 +37,9 @@ def main() -> None:
         clips = registry.members(source)
         with tempfile.TemporaryDirectory() as folder:
             reading = tqdm(files.read(clips), total=len(clips), desc=source, leave=False)
-            errors = {clip.name: error(clip, data, Path(folder)) for clip, data in reading}
+            errors = {
+                clip.name: error(loader.parse(clip, *data), Path(folder)) for clip, data in reading
+            }
         name = max(errors, key=errors.get)
         worst[source] = errors[name]
         print(f"{source}: {len(errors)} clips, largest error {errors[name] * 1e3:.5f} mm ({name})")

@@ -130,6 +130,15 @@ def test_limbs_down_a_chain(chain, wanted):
     ]
 
 
+def test_of_two_hips_the_leg_hangs_on_the_one_that_says_no_more():
+    """CMU's clips have a joint between root and hip that does not move: LHipJoint, or lhipjoint."""
+    names = ["Hips", "LHipJoint", "LeftHip", "LeftKnee", "RHipJoint", "RightHip", "RightKnee"]
+    found = roles.find(names, [-1, 0, 1, 2, 0, 4, 5])
+    assert found["left_upper_leg"] == 2 and found["right_upper_leg"] == 5
+    joints = ["Hips_jnt", "LeftHip_jnt", "LeftHip_twist", "LeftKnee_jnt"]
+    assert roles.find(joints, [-1, 0, 1, 1])["left_upper_leg"] == 1
+
+
 def test_a_root_above_the_pelvis_is_not_the_hips():
     names = ["root", "pelvis", *CANONICAL.names[1:]]
     parents = [-1, *(parent + 1 for parent in CANONICAL.parents)]

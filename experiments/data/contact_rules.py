@@ -51,7 +51,7 @@ def main() -> None:
     made["turning walk"] = list(_gaits((1.2, 1.2), turn_rate=0.8))
     made["starts and stops"] = list(_gaits(([0, 0, 1.4, 1.4, 0, 0], [0, 0, 3.0, 3.0, 0, 0])))
     clips = {source: _train(source) for source in REAL}
-    rows = [(c.source, c.path, c.split) for s in REAL for c in choose(s)]
+    rows = [(c.source, c.where, c.split) for s in REAL for c in choose(s)]
     result = {
         "command": " ".join(record.command()),
         "code_version": motionlab.__version__,

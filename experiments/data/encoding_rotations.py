@@ -79,7 +79,7 @@ def main() -> None:
     record = {
         "command": "python -m experiments.data.encoding_rotations",
         "code_version": motionlab.__version__,
-        "data_hash": splits.digest((c.source, c.path, c.split) for c in clips),
+        "data_hash": splits.digest((c.source, c.where, c.split) for c in clips),
         "rule": __doc__.split("\n\n")[3].replace("\n", " ").strip(),
         "rule_gives": choose(rows),
         "encodings": rows,

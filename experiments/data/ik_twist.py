@@ -40,7 +40,7 @@ def main() -> None:
     result = {
         "command": " ".join(record.command()),
         "code_version": motionlab.__version__,
-        "data_hash": splits.digest([(c.source, c.path, c.split) for c in choose("locomotion")]),
+        "data_hash": splits.digest([(c.source, c.where, c.split) for c in choose("locomotion")]),
         "sources": {name: recovered(motions) for name, motions in sorted(sources.items())},
         "constants": {"straight": hinge.STRAIGHT, "smooth": 1.0},
         "grid": [row for straight in STRAIGHT for row in grid(some, straight)],

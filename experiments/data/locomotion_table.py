@@ -203,7 +203,7 @@ def main() -> None:
             **summary(rows),
         }
         print(name, json.dumps(sources[name], indent=1))
-    facts = "\n".join(f"{clip.source} {clip.path} {clip.sha256} {clip.split}" for clip in clips)
+    facts = "\n".join(f"{clip.source} {clip.where} {clip.sha256} {clip.split}" for clip in clips)
     record = {
         "command": "python -m experiments.data.locomotion_table",
         "code_version": motionlab.__version__,

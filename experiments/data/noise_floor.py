@@ -50,7 +50,7 @@ def main() -> None:
     output = Path(parser.parse_args().output)
     torch.set_num_threads(1)  # a clip is too small to share
     begin = time.perf_counter()
-    rows = [(c.source, c.path, c.split) for name, _ in SETS.values() for c in choose(name)]
+    rows = [(c.source, c.where, c.split) for name, _ in SETS.values() for c in choose(name)]
     result = {
         "command": " ".join(record.command()),
         "code_version": motionlab.__version__,

@@ -32,18 +32,20 @@ class List:
     def run(self) -> None:
         from .datasets import files, info, names, registry
 
-        print(f"{'name':18} {'clips':>5} {'minutes':>7} {'MB':>6}  {'at hand':9} licence")
+        print(f"{'name':20} {'clips':>5} {'minutes':>7} {'MB':>6}  {'at hand':9} licence")
         for name in names():
             about = info(name)
             if name == registry.GAITS:
                 here = "always"
             else:
-                clips = registry.members(name)
-                count = len(clips) - len(files.missing(clips))
-                here = "yes" if count == len(clips) else f"{count}/{len(clips)}" if count else "no"
+                wanted = registry.files_of(registry.members(name))
+                count = len(wanted) - len(files.missing(wanted))
+                here = (
+                    "yes" if count == len(wanted) else f"{count}/{len(wanted)}" if count else "no"
+                )
             licence = "as the sources" if name in registry.MIXED else about.licence
             print(
-                f"{name:18} {about.clips:5} {about.minutes:7.1f} {about.bytes / 1e6:6.1f}  "
+                f"{name:20} {about.clips:5} {about.minutes:7.1f} {about.bytes / 1e6:6.1f}  "
                 f"{here:9} {licence}"
             )
         print(f"\nfiles are kept in {files.cache_folder()}")
@@ -65,21 +67,21 @@ class Fetch:
         if self.name == registry.GAITS:
             print(NO_FILES)
             return
-        clips = registry.members(self.name)
-        damaged = {clip for clip, fault in files.verify(clips) if fault}
-        absent = files.missing(clips) + [clip for clip in clips if clip in damaged]
+        wanted = registry.files_of(registry.members(self.name))
+        damaged = {file for file, fault in files.verify(wanted) if fault}
+        absent = files.missing(wanted) + [file for file in wanted if file in damaged]
         if not absent:
-            print(f"{self.name}: all {len(clips)} clips are at hand.")
+            print(f"{self.name}: all {len(wanted)} files are at hand.")
             return
         print(info(self.name))
         print(
-            f"\n{len(absent)} of {len(clips)} clips, {sum(c.bytes for c in absent) / 1e6:.1f} MB, "
+            f"\n{len(absent)} of {len(wanted)} files, {sum(f.bytes for f in absent) / 1e6:.1f} MB, "
             f"to {files.cache_folder()}"
         )
         if not self.yes:
             _confirm()
         files.fetch(absent, self.name)
-        print(f"{self.name}: {len(absent)} clips downloaded and checked.")
+        print(f"{self.name}: {len(absent)} files downloaded and checked.")
 
 
 @dataclass
@@ -97,25 +99,26 @@ class Verify:
         if self.name == registry.GAITS:
             print(NO_FILES)
             return
-        clips = registry.members(self.name) if self.name else list(registry.clips())
-        bar = tqdm(total=len(clips), desc="checking", unit="clip", leave=False, delay=1)
+        clips = registry.members(self.name) if self.name else registry.clips()
+        wanted = registry.files_of(clips)
+        bar = tqdm(total=len(wanted), desc="checking", unit="file", leave=False, delay=1)
         found = {}
         with bar:
-            for clip, fault in files.verify(clips):
-                found[clip] = fault
+            for file, fault in files.verify(wanted):
+                found[file] = fault
                 bar.update()
         faults = [fault for fault in found.values() if fault]
-        absent = Counter(clip.source for clip in clips if clip not in found)
+        absent = Counter(file.source for file in wanted if file not in found)
         what = self.name or "all data sets"
         print(
-            f"{what}: {len(found) - len(faults)} of {len(clips)} clips right, {len(faults)} wrong, "
+            f"{what}: {len(found) - len(faults)} of {len(wanted)} files right, {len(faults)} wrong, "
             f"{absent.total()} absent"
         )
         if absent:
             print("absent: " + ", ".join(f"{count} of {name}" for name, count in absent.items()))
         if absent and (self.name or not found):
             faults.append(
-                f"{absent.total()} clips are not on this machine; let MOTIONLAB_DATA name the "
+                f"{absent.total()} files are not on this machine; let MOTIONLAB_DATA name the "
                 f"folder that holds them, or run `python -m motionlab data fetch "
                 f"{self.name or next(iter(absent))}`."
             )

@@ -21,6 +21,10 @@ class GltfError(MotionFileError):
     """A glTF file that can't be read or written; the message names file, fault and remedy."""
 
 
+class GodotError(MotionFileError):
+    """A file of the engine Godot that can't be read."""
+
+
 class SkeletonError(MotionLabError):
     """A skeleton that is not a tree of joints, or that lacks what was asked of it."""
 

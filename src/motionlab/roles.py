@@ -28,7 +28,8 @@ name that says more, as ``LeftFootIK`` or ``LeftHandThumb1``, gets no role::
     head          head skull
 
 Then the tree: down a leg come upper leg, lower leg, foot and toes, down an arm shoulder, upper arm,
-lower arm and hand, and of two joints that could be either the upper one is it. Hips are where both
+lower arm and hand, and of two joints that could be either the upper one is it, or the one whose name
+has nothing left out (CMU's ``LeftHip``, which hangs on a ``LHipJoint``). Hips are where both
 legs meet, whatever they are called, the chest is where the arms branch off, the spine is the first
 joint from the one to the other, the neck carries the head.
 
@@ -94,12 +95,13 @@ def _find(
 ) -> tuple[tuple[str, int], ...]:
     """The roles and their joints; given : those that were said, None for a role without a joint."""
     said = dict(given)
-    sides, words, _ = zip(*readings(names), strict=True)
+    sides, words, left_out = zip(*readings(names), strict=True)
+    plain = [not any(map(str.isalpha, rest)) for rest in left_out]
     limbs: dict[str, int] = {}
     for side in SIDES:
         own = [word if s == side else "" for s, word in zip(sides, words, strict=True)]
         for parts in (ARM, LEG):
-            limb = _limb(_weights(own, parts, side, said), parents, parts)
+            limb = _limb(_weights(own, plain, parts, side, said), parents, parts)
             limbs |= {f"{side}_{part}": joint for part, joint in limb.items()}
     taken = {*limbs.values(), *said.values()}
     kinds = [
@@ -188,14 +190,20 @@ def _check(given: Mapping[str, str] | None, names: Sequence[str]) -> dict[str, i
 
 
 def _weights(
-    words: Sequence[str], parts: Sequence[str], side: str, said: Mapping[str, int | None]
+    words: Sequence[str],
+    plain: Sequence[bool],
+    parts: Sequence[str],
+    side: str,
+    said: Mapping[str, int | None],
 ) -> list[dict[str, int]]:
-    """How much each joint's word speaks for each part of a limb; what was said outweighs all."""
+    """How much each joint's word speaks for each part of a limb, a little more if it is all of the
+    name; what was said outweighs all."""
     open_ = [part for part in parts if f"{side}_{part}" not in said]
     fixed = {joint: role for role, joint in said.items() if joint is not None}
     weights: list[dict[str, int]] = []
     for joint, word in enumerate(words):
-        says = {part: weight for part, weight in LIMB_OF.get(word, {}).items() if part in open_}
+        known = LIMB_OF.get(word, {}).items()
+        says = {part: weight + plain[joint] for part, weight in known if part in open_}
         if joint in fixed:
             part = fixed[joint].removeprefix(f"{side}_")
             says = {part: _SAID} if part in parts else {}

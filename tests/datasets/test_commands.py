@@ -69,14 +69,14 @@ def test_fetch_and_verify(toy, capsys):
     toy.serve()
     assert main(["data", "verify", "toy"]) == 1
     printed = capsys.readouterr()
-    assert "0 of 3 clips right, 0 wrong, 3 absent" in printed.out
+    assert "0 of 3 files right, 0 wrong, 3 absent" in printed.out
     assert "MOTIONLAB_DATA" in printed.err and "data fetch toy" in printed.err
     assert main(["data", "fetch", "toy", "--yes"]) == 0
     assert "CC BY-NC 4.0 (non-commercial)" in capsys.readouterr().out
     assert main(["data", "fetch", "toy"]) == 0
-    assert "all 3 clips are at hand" in capsys.readouterr().out
+    assert "all 3 files are at hand" in capsys.readouterr().out
     assert main(["data", "verify"]) == 0
-    assert "3 of 3 clips right" in capsys.readouterr().out
+    assert "3 of 3 files right" in capsys.readouterr().out
 
 
 def test_verify_of_everything_bears_absent_clips_unless_all_are(toy, capsys):
@@ -88,7 +88,7 @@ def test_verify_of_everything_bears_absent_clips_unless_all_are(toy, capsys):
     wrong.unlink()
     capsys.readouterr()
     assert main(["data", "verify"]) == 0
-    assert "2 of 3 clips right, 0 wrong, 1 absent\nabsent: 1 of toy" in capsys.readouterr().out
+    assert "2 of 3 files right, 0 wrong, 1 absent\nabsent: 1 of toy" in capsys.readouterr().out
     assert main(["data", "verify", "toy"]) == 1
     wrong.write_bytes(b"rot")
     assert main(["data", "verify"]) == 1

@@ -50,7 +50,7 @@ def test_large_data_is_fetched_only_when_asked(toy, monkeypatch):
 
 def test_download_false(toy):
     toy.serve()
-    with pytest.raises(DataError, match="3 of 3 clips of 'toy' are not on this machine"):
+    with pytest.raises(DataError, match="3 of 3 files of 'toy' are not on this machine"):
         datasets.load("toy", download=False)
     assert toy.server.requests == []
 

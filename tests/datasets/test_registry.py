@@ -3,6 +3,7 @@
 import re
 from collections import defaultdict
 from importlib.resources import files
+from itertools import pairwise
 
 import pytest
 
@@ -10,7 +11,11 @@ from motionlab import MotionLabError, datasets
 from motionlab.datasets import registry, splits
 
 # Changes only when clips or splits are changed on purpose; results name it.
-DIGEST = "dddebbbf3d4342451470c5f46e4c2587c4928f4870e323ce36b4e7ae54722340"
+DIGEST = "1249722f51c995c1d034a0f96c361d4a6b49fc032001d24e68732ac77bc5e438"
+# Of the five sources that there were first.
+FIRST = ("bandai-locomotion", "bandai-actions", "aclstm-cmu", "accad", "cmu")
+FIRST_DIGEST = "dddebbbf3d4342451470c5f46e4c2587c4928f4870e323ce36b4e7ae54722340"
+LATER = ("cmu-131", "cmu-amc", "o3de-motionmatching", "virvig-jl")
 
 # What the sources say of themselves: clips, minutes.
 SIZES = {
@@ -19,6 +24,10 @@ SIZES = {
     "aclstm-cmu": (43, 20.2),
     "accad": (69, 6.8),
     "cmu": (36, 4.5),
+    "cmu-131": (2, 0.3),
+    "cmu-amc": (94, 5.1),
+    "o3de-motionmatching": (73, 22.2),
+    "virvig-jl": (4, 1.3),
 }
 
 
@@ -43,14 +52,41 @@ def test_sizes(name):
 
 def test_rows_are_sound():
     clips = registry.clips()
-    assert len({(c.source, c.name) for c in clips}) == len(clips) == 1284
-    assert [(c.source, c.path) for c in clips] == sorted((c.source, c.path) for c in clips)
+    assert len({(c.source, c.name) for c in clips}) == len(clips) == 1457
+    assert [(c.source, c.path, c.skip) for c in clips] == sorted(
+        (c.source, c.path, c.skip) for c in clips
+    )
     for clip in clips:
         assert re.fullmatch(r"[0-9a-f]{64}", clip.sha256)
-        assert re.fullmatch(r"[\w./-]+\.bvh", clip.path) and ".." not in clip.path
+        assert re.fullmatch(r"[\w./-]+\.(bvh|amc|res)", clip.path) and ".." not in clip.path
         assert clip.url.startswith("https://raw.githubusercontent.com/")
-        assert clip.frames >= 20 and clip.bytes > 20_000 and clip.action and clip.style
+        still = clip.name == "JL_mm_tpose"  # one frame
+        assert still or clip.frames >= 20 and clip.bytes > 20_000
+        assert clip.action and clip.style
         assert clip.fps == (60 if "salsa" in clip.path else clip.fps) and clip.fps in (30, 60, 120)
+
+
+def test_files_lie_where_they_are_published():
+    clips = {(clip.source, clip.name): clip for clip in registry.clips()}
+    for source, name, end in (
+        ("cmu-amc", "16_35", "/mocap/16/16_35.amc"),
+        ("cmu-amc", "127_03", "/mocap/127/127_03.amc"),
+        ("cmu-amc", "91_01", "/Motion%20Graphs%20Project/data/mocap/91_01.amc"),
+        ("cmu-amc", "91_13", "/graphs/graph91/mocap/hide/91_13.amc"),
+        ("virvig-jl", "JL_mm_tpose", "/BVH/JL_mm_tpose.txt"),
+        ("accad", "Male1_B3_Walk", "/bvh/Male1_B3_Walk.bvh"),
+    ):
+        assert clips[source, name].url.endswith(end)
+    (skeleton,) = clips["cmu-amc", "91_01"].besides
+    assert skeleton.path == "91.asf" and skeleton.url.endswith("/data/mocap/91.asx")
+
+
+def test_files_are_counted_once():
+    """A take in parts is one file; a person's skeleton is beside each of his clips."""
+    clips = [c for c in registry.clips() if c.source == "cmu-amc" or c.path == "Walk1.res"]
+    files = registry.files_of(clips)
+    assert len(files) == 94 + 8 + 1 and all(len(c.besides) == 1 for c in clips if not c.part)
+    assert datasets.info("o3de-motionmatching").bytes == 45_143_967
 
 
 def test_table_is_small():
@@ -63,10 +99,28 @@ def test_names_of_numbered_clips_say_their_folder():
 
 
 def test_splits_are_those_of_the_rule():
-    clips = registry.clips()
+    clips = [clip for clip in registry.clips() if not clip.part]
     expected = splits.assign([(c.source, c.performance, c.action, c.style) for c in clips])
     assert [clip.split for clip in clips] == expected
-    assert splits.digest((c.source, c.path, c.split) for c in clips) == DIGEST
+    assert splits.digest((c.source, c.where, c.split) for c in registry.clips()) == DIGEST
+    first = [clip for clip in clips if clip.source in FIRST]
+    assert splits.digest((c.source, c.path, c.split) for c in first) == FIRST_DIGEST
+
+
+def test_parts_of_a_take_are_apart():
+    takes = defaultdict(list)
+    for clip in registry.clips():
+        if clip.part:
+            takes[clip.path].append(clip)
+    assert len(takes) == 22
+    for parts in takes.values():
+        assert {part.split for part in parts} == set(splits.SPLITS)
+        for before, after in pairwise(parts):
+            assert after.skip - before.skip - before.frames >= splits.GAP * before.fps
+    assert "Walk1_0001-0478" in {part.name for part in takes["Walk1.res"]}
+    assert all(
+        c.seconds <= splits.LONG for c in registry.clips() if c.source in LATER and not c.part
+    )
 
 
 def test_splits_do_not_depend_on_order():
@@ -75,9 +129,16 @@ def test_splits_do_not_depend_on_order():
 
 
 def test_shares():
-    clips = registry.clips()
+    """Of whole clips by number, of parts of takes by time."""
     for split, low, high in (("train", 0.77, 0.83), ("val", 0.08, 0.13), ("test", 0.08, 0.13)):
-        assert low < sum(c.split == split for c in clips) / len(clips) < high
+        for part in (True, False):
+            sizes = [
+                (c.seconds if part else 1, c.split)
+                for c in registry.clips()
+                if bool(c.part) == part
+            ]
+            its = sum(size for size, of in sizes if of == split)
+            assert low < its / sum(size for size, _ in sizes) < high
 
 
 def test_every_source_action_and_style_has_clips_to_hold_out():
@@ -89,7 +150,7 @@ def test_every_source_action_and_style_has_clips_to_hold_out():
         for group, by_split in groups.items():
             if len(set().union(*by_split.values())) >= 3:
                 assert set(by_split) == set(splits.SPLITS), group
-    for source in registry.sources():
+    for source in registry.sources().keys() - {"cmu-131"}:  # two clips
         assert {clip.split for clip in registry.members(source)} == set(splits.SPLITS)
 
 
@@ -107,10 +168,10 @@ def test_partners_of_a_dance_and_cuts_of_a_take_are_one_performance():
     assert cuts[0].performance == cuts[1].performance
 
 
-def test_examples_are_small_and_of_every_source():
+def test_examples_are_small_and_of_every_source_that_there_was_first():
     clips = registry.members("examples")
     assert len(clips) == 14 and sum(clip.bytes for clip in clips) <= 10_000_000
-    assert {clip.source for clip in clips} == set(registry.sources())
+    assert {clip.source for clip in clips} == set(FIRST)
     assert {clip.style for clip in clips if clip.source == "aclstm-cmu"} == {
         "indian", "martial", "salsa",
     }  # fmt: skip
@@ -130,7 +191,7 @@ def test_info_tells_licence_and_citation():
 
 def test_table():
     table = datasets.table()
-    assert list(table.columns) == registry.COLUMNS and len(table) == 1284
+    assert list(table.columns) == registry.COLUMNS and len(table) == 1457
     salsa = table[table["style"] == "salsa"]
     assert (salsa.fps == 60).all() and len(salsa) == 28
     assert (table.seconds == table.frames / table.fps).all()

@@ -6,7 +6,8 @@ one skeleton; and procedural gaits.
 ['gaits', 'examples', 'locomotion', 'bandai-locomotion', 'bandai-actions']
 """
 
+from .about import Info
 from .loader import from_folder, load
-from .registry import Info, info, names, table
+from .registry import info, names, table
 
 __all__ = ["Info", "from_folder", "info", "load", "names", "table"]

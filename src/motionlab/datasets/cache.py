@@ -34,7 +34,11 @@ def key(clips: Sequence[Clip], process: int = 0) -> str:
 
     process : the number of what was done to them after reading, 0 for nothing.
     """
-    facts = [(c.source, c.path, c.sha256, c.fps, c.skip, sources()[c.source].units) for c in clips]
+    facts = [
+        (c.source, c.where, c.sha256, c.fps, c.skip, sources()[c.source].units,
+         *(file.sha256 for file in c.besides))
+        for c in clips
+    ]  # fmt: skip
     return hashlib.sha256(json.dumps([FORMAT, process, facts]).encode()).hexdigest()
 
 

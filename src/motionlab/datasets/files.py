@@ -22,7 +22,7 @@ from urllib.parse import urlsplit
 from tqdm import tqdm
 
 from ..errors import DataError
-from .registry import Clip, sources
+from .registry import Clip, File, files_of, sources
 
 _UNREADABLE = (OSError, EOFError, RuntimeError, zipfile.BadZipFile, lzma.LZMAError, zlib.error)
 # More than this is only downloaded when asked for.
@@ -83,33 +83,33 @@ class Shelf:
         if self.archive:
             self.archive.close()
 
-    def place(self, clip: Clip) -> str | None:
-        """Where the clip lies, for people to read; None if it is not here."""
-        if clip.path in self._in_archive:
-            return f"{self.archive.filename}:{clip.path}"
-        return next((str(f / clip.path) for f in self.folders if (f / clip.path).is_file()), None)
+    def place(self, file: File) -> str | None:
+        """Where the file lies, for people to read; None if it is not here."""
+        if file.path in self._in_archive:
+            return f"{self.archive.filename}:{file.path}"
+        return next((str(f / file.path) for f in self.folders if (f / file.path).is_file()), None)
 
-    def read(self, clip: Clip) -> bytes:
-        """The clip's bytes, checked.
+    def read(self, file: File) -> bytes:
+        """The file's bytes, checked.
 
         Raises
         ------
         DataError : the file is damaged or can't be read.
         """
-        place = self.place(clip)
+        place = self.place(file)
         try:
-            if clip.path in self._in_archive:
-                data = self.archive.read(clip.path)
+            if file.path in self._in_archive:
+                data = self.archive.read(file.path)
             else:
                 data = Path(place).read_bytes()
         except _UNREADABLE as error:
             raise DataError(f"{place}: can't be read ({error}); copy or fetch it again.") from error
         found = hashlib.sha256(data).hexdigest()
-        if found != clip.sha256:
+        if found != file.sha256:
             raise DataError(
-                f"{place}: is not the file it should be (SHA-256 {found}, expected {clip.sha256}); "
+                f"{place}: is not the file it should be (SHA-256 {found}, expected {file.sha256}); "
                 "it is damaged or edited: remove it, or let MOTIONLAB_DATA name another folder, and "
-                f"run `python -m motionlab data fetch {clip.source}`."
+                f"run `python -m motionlab data fetch {file.source}`."
             )
         return data
 
@@ -132,59 +132,60 @@ def _open_zip(path: Path) -> zipfile.ZipFile:
     return archive
 
 
-def _by_source(clips: Sequence[Clip]) -> Iterator[tuple[Shelf, list[Clip]]]:
-    groups: dict[str, list[Clip]] = {}
-    for clip in clips:
-        groups.setdefault(clip.source, []).append(clip)
+def _by_source(files: Sequence[File]) -> Iterator[tuple[Shelf, list[File]]]:
+    groups: dict[str, list[File]] = {}
+    for file in files:
+        groups.setdefault(file.source, []).append(file)
     for source, members in groups.items():
         with Shelf(source) as shelf:
             yield shelf, members
 
 
-def missing(clips: Sequence[Clip]) -> list[Clip]:
-    """Those of the clips that are not on this machine."""
-    return [c for shelf, members in _by_source(clips) for c in members if shelf.place(c) is None]
+def missing(files: Sequence[File]) -> list[File]:
+    """Those of the files that are not on this machine."""
+    return [f for shelf, members in _by_source(files) for f in members if shelf.place(f) is None]
 
 
-def read(clips: Sequence[Clip]) -> Iterator[tuple[Clip, bytes]]:
-    """Clips, which must be at hand, and their checked bytes."""
+def read(clips: Sequence[Clip]) -> Iterator[tuple[Clip, list[bytes]]]:
+    """Clips, which must be at hand, and the checked bytes of their file and of those besides."""
     for shelf, members in _by_source(clips):
         for clip in members:
-            yield clip, shelf.read(clip)
+            yield clip, [shelf.read(file) for file in (clip, *clip.besides)]
 
 
-def verify(clips: Sequence[Clip]) -> Iterator[tuple[Clip, str | None]]:
-    """Clips that are at hand, and what is wrong with their file, None if nothing is."""
-    for shelf, members in _by_source(clips):
-        for clip in members:
-            if shelf.place(clip) is not None:
+def verify(files: Sequence[File]) -> Iterator[tuple[File, str | None]]:
+    """Files that are at hand, and what is wrong with them, None if nothing is."""
+    for shelf, members in _by_source(files):
+        for file in members:
+            if shelf.place(file) is not None:
                 try:
-                    shelf.read(clip)
-                    yield clip, None
+                    shelf.read(file)
+                    yield file, None
                 except DataError as error:
-                    yield clip, str(error)
+                    yield file, str(error)
 
 
 def get(name: str, clips: Sequence[Clip], download: bool | None = None) -> None:
-    """Bring the clips onto this machine, or say why not and what can be done.
+    """Bring the clips' files onto this machine, or say why not and what can be done.
 
     `download` None downloads at most 10 MB, True anything, False nothing.
     """
-    absent = missing(clips)
+    wanted = files_of(clips)
+    absent = missing(wanted)
     if not absent:
         return
-    size = sum(clip.bytes for clip in absent)
+    size = sum(file.bytes for file in absent)
     if download or (download is None and size <= IMPLICIT_BYTES):
         fetch(absent, name)
     else:
-        raise DataError(_absent(name, absent, len(clips), "they are not downloaded unasked"))
+        raise DataError(_absent(name, absent, len(wanted), "they are not downloaded unasked"))
 
 
 def _absent(
-    name: str, absent: Sequence[Clip], wanted: int, reason: str, failed: bool = False
+    name: str, absent: Sequence[File], wanted: int, reason: str, failed: bool = False
 ) -> str:
     """What is missing, why, and what helps; a download that has `failed` is the last advice."""
-    size = sum(clip.bytes for clip in absent) / 1e6
+    size = sum(file.bytes for file in absent) / 1e6
     first = absent[0]
     folder = os.environ.get("MOTIONLAB_DATA")
     looked = f"MOTIONLAB_DATA={folder}" if folder else "MOTIONLAB_DATA is not set"
@@ -199,15 +200,15 @@ def _absent(
         ways = [f"{command}downloads {size:.1f} MB, such as {first.url}", *offline]
     return "\n".join(
         [
-            f"{len(absent)} of {wanted} clips of {name!r} are not on this machine ({looked}), such "
+            f"{len(absent)} of {wanted} files of {name!r} are not on this machine ({looked}), such "
             f"as {first.path}; {reason}. Any of these helps:",
             *ways,
         ]
     )
 
 
-def fetch(clips: Sequence[Clip], name: str, quiet: bool = False) -> None:
-    """Download clips into the user's cache folder, a few at a time, with a progress bar.
+def fetch(files: Sequence[File], name: str, quiet: bool = False) -> None:
+    """Download files into the user's cache folder, a few at a time, with a progress bar.
 
     What is there with the right hash is kept; a file gets its name only when it is whole and right.
 
@@ -216,52 +217,52 @@ def fetch(clips: Sequence[Clip], name: str, quiet: bool = False) -> None:
     DataError : a download fails or brings something else than expected.
     """
     bar = tqdm(
-        total=sum(clip.bytes for clip in clips), desc=f"fetching {name}", unit="B",
+        total=sum(file.bytes for file in files), desc=f"fetching {name}", unit="B",
         unit_scale=True, leave=False, delay=0.5, disable=quiet or None,
     )  # fmt: skip
     pool = ThreadPoolExecutor(_PARALLEL)
-    jobs = {pool.submit(_fetch_one, clip): clip for clip in clips}
+    jobs = {pool.submit(_fetch_one, file): file for file in files}
     done = 0
     try:
         for job in as_completed(jobs):
-            clip = jobs[job]
+            file = jobs[job]
             try:
                 job.result()
             except Exception as error:  # requests, urllib3, pooch and the disk each have their own
-                left = [clip, *(c for c in clips if c is not clip)][: len(clips) - done]
-                reason = f"downloading {clip.url} failed ({_in_short(error, clip)})"
-                raise DataError(_absent(name, left, len(clips), reason, failed=True)) from error
+                left = [file, *(f for f in files if f is not file)][: len(files) - done]
+                reason = f"downloading {file.url} failed ({_in_short(error, file)})"
+                raise DataError(_absent(name, left, len(files), reason, failed=True)) from error
             done += 1
-            bar.update(clip.bytes)
+            bar.update(file.bytes)
     finally:
         pool.shutdown(cancel_futures=True)
         bar.close()
 
 
-def _fetch_one(clip: Clip) -> None:
+def _fetch_one(file: File) -> None:
     import pooch
 
     pooch.get_logger().setLevel(logging.ERROR)
-    folder = download_folder(clip.source)
+    folder = download_folder(file.source)
     # pooch makes folders too, but two of its threads may get in each other's way
-    (folder / clip.path).parent.mkdir(parents=True, exist_ok=True)
+    (folder / file.path).parent.mkdir(parents=True, exist_ok=True)
     pooch.create(
         path=folder,
-        base_url=sources()[clip.source].url,
-        registry={clip.path: f"sha256:{clip.sha256}"},
-        urls={clip.path: clip.url},
+        base_url=sources()[file.source].url,
+        registry={file.path: f"sha256:{file.sha256}"},
+        urls={file.path: file.url},
         retry_if_failed=_RETRIES,
-    ).fetch(clip.path, downloader=pooch.HTTPDownloader(timeout=_TIMEOUT))
+    ).fetch(file.path, downloader=pooch.HTTPDownloader(timeout=_TIMEOUT))
 
 
-def _in_short(error: BaseException, clip: Clip) -> str:
+def _in_short(error: BaseException, file: File) -> str:
     import requests
 
     silent = isinstance(error, requests.ConnectionError | requests.Timeout)
     if silent and not isinstance(error, requests.exceptions.SSLError):
-        return f"{urlsplit(clip.url).hostname} does not answer: no network?"
+        return f"{urlsplit(file.url).hostname} does not answer: no network?"
     if isinstance(error, ValueError) and "hash" in str(error).lower():
-        return f"what came has another SHA-256 than {clip.sha256}"
+        return f"what came has another SHA-256 than {file.sha256}"
     # requests wraps urllib3's error, which wraps the one that says what happened
     while True:
         inner = getattr(error, "reason", None) or (error.args[0] if error.args else None)

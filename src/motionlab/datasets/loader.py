@@ -8,12 +8,13 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import torch
 from tqdm import tqdm
 
 from ..errors import DataError
+from ..io.acclaim import parse_amc
 from ..io.bvh import parse_bvh
 from ..io.bvh_reading import Reading
 from ..io.motion_file import ENDINGS, is_motion, read_motion
@@ -21,6 +22,7 @@ from ..motion import Motion
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
 from . import cache, files, locomotion
+from .o3de import parse_take
 from .registry import (
     EXAMPLES,
     GAITS,
@@ -114,7 +116,10 @@ def _from_files(name: str, wanted: Sequence[Clip], download: bool | None) -> lis
     files.get(name, [clip for some in to_parse.values() for clip in some], download)
     with _progress(f"reading {name}", sum(map(len, to_parse.values()))) as bar:
         for label, some in to_parse.items():
-            parsed = [prepare(_parse(clip, data, bar)) for clip, data in files.read(some)]
+            parsed = []
+            for clip, data in files.read(some):
+                parsed.append(prepare(parse(clip, *data)))
+                bar.update()
             arrays = cache.pack(parsed)
             if some == _cached_together(name)[label]:
                 cache.write(label, some, arrays, process)
@@ -155,11 +160,18 @@ def _cached_together(name: str) -> dict[str, list[Clip]]:
     return groups
 
 
-def _parse(clip: Clip, data: bytes, bar) -> Motion:
-    units = sources()[clip.source].units
-    motion = parse_bvh(data, clip.path, units=units, up="y", fps=clip.fps, source=clip.source)
-    bar.update()
-    return replace(motion[clip.skip :], name=clip.name)
+def parse(clip: Clip, data: bytes, *besides: bytes) -> Motion:
+    """A clip from the bytes of its file and of those besides it."""
+    names = {"where": clip.path, "source": clip.source}
+    how = {"units": sources()[clip.source].units, "up": "y", "fps": clip.fps}
+    match PurePosixPath(clip.path).suffix:
+        case ".res":
+            motion = parse_take(data, **names)
+        case ".amc":
+            motion = parse_amc(data, *besides, **names, **how)
+        case _:
+            motion = parse_bvh(data, **names, **how)
+    return replace(motion[clip.skip : clip.skip + clip.frames], name=clip.name)
 
 
 def _gaits(split: str | None, clips: Sequence[str] | None) -> list[Motion]:

@@ -1,12 +1,17 @@
 """The data set "locomotion": one body that walks, runs, turns, starts and stops.
 
-Clips of three sources, listed in ``locomotion.tsv``, are resampled to 30 frames per second and
+Clips of six sources, listed in ``locomotion.tsv``, are resampled to 30 frames per second and
 retargeted to `Skeleton.canonical`. They keep their names, splits and licences. Listed are
 
 * of ``bandai-locomotion`` everything: walks (also backwards and sideways), runs, dashes, turns;
 * of ``accad`` walks, runs, their turns, starts and stops, walks and runs backwards, side steps; no
   boxes, crouches, hops, jumps, skips, nor standing about;
-* of ``cmu`` the three walks.
+* of ``cmu`` the three walks;
+* of ``cmu-amc`` all but two crouches and two leaps, and but ``02_01``, as a clip of ``cmu`` is
+  called so;
+* of ``o3de-motionmatching`` walks, runs, turns, also on the spot, in all directions; no takes of
+  crouching, jumping and pushing;
+* of ``virvig-jl`` all but its T-pose.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ from .registry import LOCOMOTION_FPS
 FORMAT = 5
 # Where a source's rest pose is no standing body: a clip that begins with standing upright, and how
 # many frames of it.
-STANCES = {"accad": ("Male1_B1_StandToWalk", 30)}
+STANCES = {"accad": ("Male1_B1_StandToWalk", 30), "virvig-jl": ("JL_mm_tpose", 1)}
 # Where nobody stands still either: clips that tell together how the source's rig stands.
 LEARNED = {
     "bandai-locomotion": (

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import html
-import textwrap
+import re
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from functools import cache
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from ..errors import DataError
+from .about import Info
 from .splits import SPLITS
 
 if TYPE_CHECKING:
@@ -54,35 +55,63 @@ class Source:
     commercial: bool
     citation: str
     quirks: tuple[str, ...]
+    besides: Mapping[str, File]  # what clips need besides their own file, by how these begin
+    published: tuple[tuple[str, str], ...]  # pattern of a path, and where such a file is published
+
+    def address(self, path: str) -> str:
+        """Where a file is published."""
+        for pattern, place in self.published:
+            if found := re.fullmatch(pattern, path):
+                path = found.expand(place)
+                break
+        return self.url + quote(path)
 
 
 @dataclass(frozen=True)
-class Clip:
-    """One row of clips.tsv."""
+class File:
+    """A published file of a source."""
 
     source: str
     path: str
     sha256: str
     bytes: int
+
+    @property
+    def url(self) -> str:
+        return sources()[self.source].address(self.path)
+
+
+@dataclass(frozen=True)
+class Clip(File):
+    """One row of clips.tsv: a file, or a part of one."""
+
     frames: int  # after leaving out `skip`
     fps: float  # the true rate, whatever the header says
     skip: int  # frames in front that are calibration, not motion
     action: str
     style: str
-    performance: str  # clips with the same performance of a source share frames or the stage
+    performance: str  # clips with the same one share frames or the stage; parts of a take do not
     split: str
+    part: str = ""  # which frames of the file, if other rows are of the same one
 
     @property
     def name(self) -> str:
-        return clip_name(self.path)
+        return f"{clip_name(self.path)}_{self.part}" if self.part else clip_name(self.path)
+
+    @property
+    def where(self) -> str:
+        """The path and, of a part, which frames of the file."""
+        return f"{self.path}#{self.part}" if self.part else self.path
+
+    @property
+    def besides(self) -> tuple[File, ...]:
+        """Files that it needs, such as the skeleton of its subject."""
+        besides = sources()[self.source].besides.items()
+        return tuple(file for start, file in besides if self.path.startswith(start))
 
     @property
     def seconds(self) -> float:
         return self.frames / self.fps
-
-    @property
-    def url(self) -> str:
-        return sources()[self.source].url + quote(self.path)
 
     @property
     def licence(self) -> str:
@@ -95,7 +124,7 @@ class Clip:
 
 
 def clip_name(path: str) -> str:
-    """The file's name without .bvh; a bare number takes its folder's name in front."""
+    """The file's name without its ending; a bare number takes its folder's name in front."""
     path = PurePosixPath(path)
     return f"{path.parent.name}_{path.stem}" if path.stem.isdigit() else path.stem
 
@@ -113,23 +142,46 @@ def _toml() -> dict:
 def sources() -> dict[str, Source]:
     """All sources by name."""
     tables = {name: table for name, table in _toml().items() if name != EXAMPLES}
-    return {
-        name: Source(name=name, **{**table, "quirks": tuple(table["quirks"])})
-        for name, table in tables.items()
-    }
+    return {name: _source(name, table) for name, table in tables.items()}
+
+
+def _source(name: str, table: dict) -> Source:
+    besides = table.get("besides", {}).items()
+    return Source(
+        **{
+            **table,
+            "name": name,
+            "quirks": tuple(table["quirks"]),
+            "besides": {start: File(source=name, **facts) for start, facts in besides},
+            "published": tuple(map(tuple, table.get("published", ()))),
+        }
+    )
 
 
 @cache
 def clips() -> tuple[Clip, ...]:
-    """All clips of all sources, by source and path."""
+    """All clips of all sources, by source and path; parts of a take by time."""
     header, *lines = _text("clips.tsv").splitlines()
     kinds = {field.name: field.type for field in fields(Clip)}
     convert = [{"int": int, "float": float, "str": str}[kinds[name]] for name in header.split("\t")]
     rows = (line.split("\t") for line in lines)
-    found = (Clip(*(to(cell) for to, cell in zip(convert, row, strict=True))) for row in rows)
+    found = [Clip(*(to(cell) for to, cell in zip(convert, row, strict=True))) for row in rows]
+    rows_of = Counter((clip.source, clip.path) for clip in found)
+    found = [
+        replace(clip, part=f"{clip.skip:04d}-{clip.skip + clip.frames:04d}")
+        if rows_of[clip.source, clip.path] > 1
+        else clip
+        for clip in found
+    ]
     return tuple(
         clip if clip.performance else replace(clip, performance=clip.name) for clip in found
     )
+
+
+def files_of(clips: Iterable[Clip]) -> list[File]:
+    """The files that clips are read from, each once."""
+    every = (file for clip in clips for file in (clip, *clip.besides))
+    return list({(file.source, file.path): file for file in every}.values())
 
 
 def names() -> list[str]:
@@ -155,7 +207,7 @@ def members(name: str) -> list[Clip]:
         return [by_name[key] for key in _toml()[EXAMPLES]["clips"]]
     if name == LOCOMOTION:
         listed = set(_text("locomotion.tsv").splitlines()[1:])
-        return [clip for clip in clips() if f"{clip.source}\t{clip.path}" in listed]
+        return [clip for clip in clips() if f"{clip.source}\t{clip.where}" in listed]
     return [clip for clip in clips() if clip.source == name]
 
 
@@ -204,52 +256,6 @@ def check_wanted(wanted: Iterable[str], known: Iterable[str], name: str) -> set[
     return wanted
 
 
-@dataclass(frozen=True, repr=False)
-class Info:
-    """A data set at a glance: how much, under which licence, with what peculiarities."""
-
-    name: str
-    title: str
-    clips: int
-    minutes: float
-    bytes: int
-    licence: str
-    commercial: bool
-    citation: str
-    home: str
-    quirks: tuple[str, ...]
-    splits: dict[str, int]
-
-    def _rows(self) -> list[tuple[str, str]]:
-        size = f", {self.bytes / 1e6:.1f} MB of files" if self.bytes else ""
-        splits = ", ".join(f"{count} {name}" for name, count in self.splits.items())
-        return [
-            ("clips", f"{self.clips} ({splits}), {self.minutes:.1f} minutes{size}"),
-            ("licence", self.licence),
-            ("cite", self.citation),
-            ("home", self.home),
-            *(("quirk", quirk) for quirk in self.quirks),
-        ]
-
-    def __repr__(self) -> str:
-        rows = [
-            textwrap.fill(f"  {key:8} {value}", 100, subsequent_indent=" " * 11)
-            for key, value in self._rows()
-            if value
-        ]
-        return "\n".join([f"{self.name}: {self.title}", *rows])
-
-    def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{key}</th>"
-            f"<td style='text-align:left'>{html.escape(value)}</td></tr>"
-            for key, value in self._rows()
-            if value
-        )
-        title = f"<caption><b>{self.name}</b>: {html.escape(self.title)}</caption>"
-        return f"<table>{title}{rows}</table>"
-
-
 def info(name: str) -> Info:
     """Title, size, licence, citation and quirks of a data set. Needs no data.
 
@@ -263,7 +269,7 @@ def info(name: str) -> Info:
         "name": name,
         "clips": len(rows),
         "minutes": rows.seconds.sum() / 60,
-        "bytes": int(rows.bytes.sum()),
+        "bytes": 0 if name == GAITS else sum(file.bytes for file in files_of(members(name))),
         "splits": {split: int((rows.split == split).sum()) for split in SPLITS},
     }
     if name == GAITS:
@@ -302,7 +308,7 @@ def info(name: str) -> Info:
 _LOCOMOTION_TITLE = "Walking, running, turning, starting, stopping on the canonical skeleton"
 _LOCOMOTION_QUIRKS = (
     "Retargeted and resampled to 30 frames per second when first loaded, which takes a minute or two.",
-    "Speeds are scaled as the legs are: by 0.87 for accad.",
+    "Speeds are scaled as the legs are: by 0.87 for accad, 0.89 for o3de-motionmatching.",
 )
 
 
