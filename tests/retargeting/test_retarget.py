@@ -146,7 +146,7 @@ def test_bones_keep_their_length_and_rotations_are_rotations(gait):
 
 
 def test_knees_stay_forward_even_if_the_source_bends_them_back(gait):
-    motion = renamed(gait["walk_1.3"])
+    motion = renamed(gait["walk_1.3"], 1.1)
     knee = motion.skeleton.index("left_lower_leg")
     rotations = motion.rotations.clone()
     rotations[40:60, knee] = rotations[40:60, knee].mT  # bent the other way
@@ -345,5 +345,5 @@ def test_locomotion_stays_close_to_its_source(source, name):
     assert torch.stack(errors).quantile(0.95) < 0.06
     assert still(found) < 1e-3
     assert knee_bends(found).min() > -1e-3
-    shared = min(found.contacts.float().mean(0))
-    assert shared > 0.03  # every heel and toe comes down
+    touches = found.contacts.unflatten(1, (2, 2)).any(2).float().mean(0)
+    assert touches.min() > 0.15  # both feet come down

@@ -2,23 +2,27 @@
 
 A foot is planned as a path of its ankle and two orientations, of foot and toes. While its heel is
 in contact the ankle rests, while its toes are the toe joint rests, while both are the foot lies
-flat. What this changes is carried over the swings, from what the end of one stance asks for to what
-the beginning of the next one does (Kovar, Schreiner, Gleicher: Footskate Cleanup for Motion Capture
-Editing, 2002), so that nothing jumps. Heights are corrected stance by stance: floors of recordings
-lie too high, too low or aslant.
+flat (`plant`). Heights are corrected stance by stance: floors of recordings lie too high, too low
+or aslant.
+
+A knee near straight turns 10 degrees for 3 mm of the leg's length, so legs are kept as stretched as
+they were: of a foot that stands, the hips see to that; of one that only its toes hold, the heel
+does, and of one in the air, the ankle (`let_go`). What a stance changes is carried over the swings,
+from what the end of one asks for to what the beginning of the next one does (Kovar, Schreiner,
+Gleicher: Footskate Cleanup for Motion Capture Editing, 2002), so that nothing jumps.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import roma
 import torch
-from scipy.ndimage import binary_closing, minimum_filter1d
+from scipy.ndimage import binary_closing, distance_transform_edt, maximum_filter1d, minimum_filter1d
 from torch import Tensor
 
-from ..ik.turns import shortest_turn
+from ..ik.turns import shortest_turn, turn_about
 from ..kinematics import yaw_matrix
 
 # A part of a foot rests if it is slow: metres a second, and share of the body's speed, as markers
@@ -36,7 +40,25 @@ _SHORTEST = 2  # frames
 _STRAY = 0.025  # metres
 _DIP = 0.015  # metres by which an ankle may lie lower than in a flat foot
 _TIP = 0.003  # metres that the tip of the toes stays above the floor
+_STEP = 0.06  # metres by which what one foot stands on is higher than what the other does
+# A flat foot points so many radians below the horizontal, and its toes so many down or up from
+# where they are in a stance. It is flat in the frames with the toes highest, but for some of the
+# frames, and in both feet nearly alike.
+_FLAT, _NEAR_STANCE, _FLATTEST, _STEEPER = (-0.25, 0.95), (-0.45, 0.25), 0.75, 0.25
 _RESTED = 0.3  # seconds of standing that tell how a flat foot looks
+_ROLL, _ROUNDS = 0.5, 6  # radians that a heel may rise or sink about toes that are down
+_GAP = 0.02  # metres by which a leg may be too long or short for toes to be down
+_EASE = 0.15  # seconds in which a foot that left the floor, or comes to it, is let go of
+_UP = torch.tensor([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Sole:
+    """A flat foot that faces +z."""
+
+    toes: Tensor  # (3,) metres, from ankle to toe joint
+    tip: Tensor  # (3,) metres, from toe joint to the tip of the toes
+    heights: Tensor  # (2,) metres of ankle and toe joint above the floor
 
 
 @dataclass(frozen=True)
@@ -44,36 +66,60 @@ class Foot:
     """One foot over time."""
 
     ankle: Tensor  # (frames, 3) metres
-    foot: Tensor  # (frames, 3, 3) in the world
+    foot: Tensor  # (frames, 3, 3) in the world; identity is a flat foot that faces +z
     toes: Tensor  # (frames, 3, 3) in the world
     contacts: Tensor  # (frames, 2) bool: heel, toe
     shift: Tensor  # (frames, 3) metres by which the ankle was moved
+    sole: Sole
+
+    @property
+    def touches(self) -> Tensor:
+        """Whether heel or toes are in contact, bool (frames,)."""
+        return self.contacts.any(1)
+
+    @property
+    def reach(self) -> Tensor:
+        """Way (frames, 3) in metres from ankle to toe joint."""
+        return (self.foot @ self.sole.toes[:, None])[..., 0]
+
+    @property
+    def depth(self) -> Tensor:
+        """Metres (frames,) by which the foot lies lower than it may, negative where it is higher.
+
+        The toe joint never lies below where it is when the foot stands; an ankle may, a little,
+        while the toes are up.
+        """
+        ankle, toe = self.ankle[:, 1], (self.ankle + self.reach)[:, 1]
+        heights = self.sole.heights
+        return torch.maximum(heights[0] - _DIP - ankle, heights[1] - toe)
 
 
-def find_contacts(ankle: Tensor, toes: Tensor, foot: Tensor, speed: Tensor, fps: float) -> Tensor:
-    """Contacts bool (frames, 2) of heel and toes: slow, and low.
+def find_contacts(ankles: Tensor, toes: Tensor, feet: Tensor, speed: Tensor, fps: float) -> Tensor:
+    """Contacts bool (2, frames, 2) of heel and toes of both feet: slow, and low.
 
-    Low is told from the lowest in the neighbourhood: floors of recordings may be aslant.
+    Low is told from the lowest in the neighbourhood: floors of recordings may be aslant. A foot
+    that is held still in the air is told by the other one.
 
     Parameters
     ----------
-    ankle, toes : (frames, 3) metres.
-    foot : (frames, 3, 3), world orientations; identity is a flat foot that faces +z.
+    ankles, toes : (2, frames, 3) metres.
+    feet : (2, frames, 3, 3), world orientations; identity is a flat foot that faces +z.
     speed : (frames,) of the body, metres a second.
     fps : frames per second.
     """
-    points = torch.stack([ankle, toes], 1)
-    height = points[..., 1].numpy()
-    lowest = minimum_filter1d(height, 2 * round(_NEAR * fps) + 1, axis=0)
-    above = torch.from_numpy(height - lowest)
-    step = steps(points) * fps
+    points = torch.stack([ankles, toes], 2)
+    height = points[..., 1]
+    near = 2 * round(_NEAR * fps) + 1
+    lowest = torch.from_numpy(minimum_filter1d(height.numpy(), near, axis=1))
+    above, step = height - lowest, steps(points) * fps
     low = (above < torch.tensor(_HEIGHT)) | ((above < _STILL_HEIGHT) & (step < _STILL))
+    low &= height < lowest.flip(0) + _STEP
     found = low & (step < (_SPEED + _SLIP * speed)[:, None])
-    toes_up = torch.asin(foot[:, 1, 2].clamp(-1, 1))
-    found[:, 0] &= toes_up > -_TIPPED
-    found[:, 1] &= toes_up < _TIPPED
+    toes_up = torch.atan2(feet[..., 1, 2], feet[..., 1, 1])
+    found[..., 0] &= toes_up > -_TIPPED
+    found[..., 1] &= toes_up < _TIPPED
     found = found.numpy()
-    for column in found.T:
+    for column in (found[foot, :, part] for foot in (0, 1) for part in (0, 1)):
         column |= binary_closing(column, np.ones(3))  # gaps of one or two frames
         for start, end in runs(column):
             if column[start] and end - start < min(_SHORTEST, len(column)):
@@ -93,16 +139,44 @@ def steps(points: Tensor) -> Tensor:
     return torch.minimum(before, torch.cat([step, step[..., -1:, :]], dim=-2))
 
 
-def levelled(foot: Tensor, ankle: Tensor, toes: Tensor, fps: float) -> Tensor:
-    """Orientations (frames, 3, 3) of a foot, pitched such that it is level while it stands still.
+def levelled(
+    feet: Tensor, ankles: Tensor, toes: Tensor, fps: float, stance: Tensor | None = None
+) -> Tensor:
+    """Orientations (2, frames, 3, 3) of both feet, each pitched to be level where it stands flat.
 
-    Rest poses know little of how a foot stands. A foot that never rests stays as it is.
+    A foot that stands still tells how a flat one looks, unless it stands on its toes: it must point
+    as a flat one can, and nearly as in the stance where that is known; one that is steeper than the
+    other at its flattest, or that never stands so, is levelled as the other. If neither does, both
+    are level where they are so in the stance, or stay as they are.
+
+    Parameters
+    ----------
+    feet : (2, frames, 3, 3), world orientations; identity is a flat foot that faces +z.
+    ankles, toes : (2, frames, 3) metres.
+    fps : frames per second.
+    stance : (2,) radians by which toes point up in these orientations while the body stands.
     """
-    still = (steps(torch.stack([ankle, toes], 1)) * fps < _STILL).all(1)
-    if int(still.sum()) < _RESTED * fps:
-        return foot
-    pitch = torch.asin(foot[still][:, 1, 2].clamp(-1, 1)).median()
-    return foot @ roma.rotvec_to_rotmat(torch.stack([pitch, 0 * pitch, 0 * pitch]))
+    way = toes - ankles
+    down = torch.asin((-way[..., 1] / way.norm(dim=-1).clamp(min=1e-6)).clamp(-1, 1))
+    pitches = torch.atan2(feet[..., 1, 2], feet[..., 1, 1])
+    flat = (steps(torch.stack([ankles, toes], 2)) * fps < _STILL).all(2)
+    flat &= toes[..., 1] < toes[..., 1].flip(0) + _STEP
+    flat &= (down > _FLAT[0]) & (down < _FLAT[1])
+    if stance is None:
+        stance = torch.zeros(2)
+    else:
+        off = pitches - stance[:, None]
+        flat &= (off > _NEAR_STANCE[0]) & (off < _NEAR_STANCE[1])
+    seen = [
+        pitch[rests].quantile(_FLATTEST) - usual if rests.sum() >= _RESTED * fps else None
+        for pitch, rests, usual in zip(pitches, flat, stance, strict=True)
+    ]
+    turn = torch.zeros(2, 1, 3)
+    for i, (own, other) in enumerate((seen, seen[::-1])):
+        if other is not None and (own is None or own < other - _STEEPER):
+            own = other
+        turn[i, 0, 0] = stance[i] if own is None else stance[i] + own
+    return feet @ roma.rotvec_to_rotmat(turn)
 
 
 def runs(values: np.ndarray) -> list[tuple[int, int]]:
@@ -113,15 +187,7 @@ def runs(values: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[:-1], edges[1:], strict=True))
 
 
-def plant(
-    ankle: Tensor,
-    foot: Tensor,
-    toes: Tensor,
-    contacts: Tensor,
-    sole: Tensor,
-    tip: Tensor,
-    heights: Tensor,
-) -> Foot:
+def plant(ankle: Tensor, foot: Tensor, toes: Tensor, contacts: Tensor, sole: Sole) -> Foot:
     """Hold a foot still while it is in contact.
 
     Parameters
@@ -129,32 +195,90 @@ def plant(
     ankle : (frames, 3) metres, its way as scaled from the source.
     foot, toes : (frames, 3, 3), world orientations; identity is a flat foot that faces +z.
     contacts : bool (frames, 2): heel, toe.
-    sole : (3,) metres, from ankle to toe joint of a flat foot that faces +z.
-    tip : (3,) metres, from toe joint to the tip of the toes.
-    heights : (2,) metres of ankle and toe joint of a flat foot above the floor.
+
+    Returns
+    -------
+    Foot : where it is in contact, and not below the floor; `let_go` sees to the rest of its way.
     """
-    flat, toe_down = contacts.all(1), contacts[:, 1]
     level = _level(foot, contacts)
-    foot = _carried(foot, level, flat)
-    toes = _carried(toes, yaw_matrix(_yaw(foot)), toe_down)
-    reach = (foot @ sole[:, None])[..., 0]  # from ankle to toe joint
+    foot = _carried(foot, level, contacts.all(1))
+    toes = _carried(toes, yaw_matrix(_yaw(foot)), contacts[:, 1])
+    reach = (foot @ sole.toes[:, None])[..., 0]  # from ankle to toe joint
     shift, contacts = torch.zeros_like(ankle), contacts.clone()
     stances = [(a, b) for a, b in runs(contacts.any(1).numpy()) if contacts[a].any()]
     for start, end in stances:
         part = slice(start, end)
-        held = _stance(contacts[part], reach[part], ankle[part], heights)
+        held = _stance(contacts[part], reach[part], ankle[part], sole.heights)
         shift[part] = held - ankle[part]
         stray = (shift[part] - shift[part].median(0).values).norm(dim=-1)
         near = start + (stray < _STRAY).nonzero()[:, 0]
         if len(near):
             contacts[start : near[0]] = contacts[near[-1] + 1 : end] = False
     shift = bridged(shift, contacts.any(1))
-    # The toe joint never lies below where it is when the foot stands, the tip never below the
-    # floor; an ankle may, a little, while the toes are up.
-    low = torch.stack([heights[0] - _DIP - ankle[:, 1], heights[1] - (ankle + reach)[:, 1]], 1)
-    shift[:, 1] = shift[:, 1].maximum(low.amax(1))
-    toes = off_the_floor(toes, (ankle + shift + reach)[:, 1], tip)
-    return Foot(ankle + shift, foot, toes, contacts, shift)
+    planted = Foot(ankle + shift, foot, toes, contacts, shift, sole)
+    raised = planted.depth.clamp(min=0)[:, None] * _UP
+    return replace(planted, ankle=planted.ankle + raised, shift=shift + raised)
+
+
+def let_go(planted: Foot, hip: Tensor, stretch: Tensor, longest: float, fps: float) -> Foot:
+    """A foot whose leg is as stretched as it should be, as far as contacts permit.
+
+    About toes that are down the heel rises or sinks; toes that the leg does not reach then, of feet
+    longer than this, are not in contact after all. In the air, the ankle comes nearer to the hip or
+    goes away from it. Nothing lies below the floor then.
+
+    Parameters
+    ----------
+    planted : where it is in contact (`plant`).
+    hip : (frames, 3) metres, where the leg starts.
+    stretch : (frames,) metres that it should be long, from there to the ankle.
+    longest : metres that it can be.
+    fps : frames per second.
+    """
+    before = planted.ankle - planted.shift
+    roll, missing = _heel_roll(planted, hip, stretch)
+    on_toes = planted.touches & ~planted.contacts[:, 0]
+    far = (missing.abs() > _GAP) | (stretch - missing > longest)
+    far = maximum_filter1d(far.numpy(), 2 * round(_EASE * fps / 3) + 1)
+    lost = on_toes & torch.from_numpy(far)
+    planted = replace(planted, contacts=planted.contacts & ~lost[:, None])
+    touches = planted.touches
+    roll = bridged(roll.where(on_toes, 0.0)[:, None], touches)[:, 0]
+    foot = replace(planted, foot=turn_about(planted.foot[..., 0], roll) @ planted.foot)
+    ankle = before + bridged(planted.shift + planted.reach - foot.reach, touches)
+    leg = ankle - hip
+    length = leg.norm(dim=-1, keepdim=True).clamp(min=1e-6)
+    # what contacts leave too short or too long is let go of after them, and taken up before them
+    missing = bridged(stretch[:, None] - length, touches) * (1 - _loose(touches, fps)[:, None])
+    ankle = hip + leg / length * (stretch[:, None] - missing)
+    foot = replace(foot, ankle=ankle)
+    ankle = ankle + foot.depth.clamp(min=0)[:, None] * _UP
+    toes = off_the_floor(foot.toes, (ankle + foot.reach)[:, 1], foot.sole.tip)
+    return replace(foot, ankle=ankle, toes=toes, shift=ankle - before)
+
+
+def _heel_roll(foot: Foot, hip: Tensor, stretch: Tensor) -> tuple[Tensor, Tensor]:
+    """Angles (frames,) to the left about toe joints that stay, for the leg to be as stretched as
+    wanted, and metres (frames,) that it is too short then."""
+    axis, reach = foot.foot[..., 0], foot.reach
+    toe, roll = foot.ankle + reach, torch.zeros(len(hip))
+    for _ in range(_ROUNDS):  # Newton's method, damped where a turn hardly changes the length
+        arm = -(turn_about(axis, roll) @ reach[..., None])[..., 0]
+        leg = toe + arm - hip
+        length = leg.norm(dim=-1).clamp(min=1e-6)
+        slope = (torch.linalg.cross(axis, arm) * leg).sum(-1) / length
+        step = (stretch - length) * slope / (slope**2 + 0.1 * reach.square().sum(-1))
+        roll = (roll + step).clamp(-_ROLL, _ROLL)
+    return roll, stretch - length
+
+
+def _loose(touches: Tensor, fps: float) -> Tensor:
+    """How free (frames,) a foot is, from 0 at its contacts to 1 a while away from them."""
+    if not touches.any():
+        return torch.ones(len(touches))
+    away = torch.from_numpy(distance_transform_edt(~touches.numpy())).float()
+    part = (away / (_EASE * fps)).clamp(max=1)
+    return part**2 * (3 - 2 * part)
 
 
 def off_the_floor(toes: Tensor, height: Tensor, tip: Tensor) -> Tensor:
@@ -210,8 +334,8 @@ def _carried(orientations: Tensor, wanted: Tensor, where: Tensor) -> Tensor:
     """Orientations that are as wanted `where` (frames,) says, and change smoothly in between."""
     if not where.any():
         return orientations
-    change = roma.rotmat_to_rotvec(wanted @ orientations.mT)
-    return roma.rotvec_to_rotmat(bridged(change, where)) @ orientations
+    change = roma.rotmat_to_rotvec(orientations.mT @ wanted)  # in the foot's frame, as feet turn
+    return orientations @ roma.rotvec_to_rotmat(bridged(change, where))
 
 
 def bridged(values: Tensor, known: Tensor) -> Tensor:

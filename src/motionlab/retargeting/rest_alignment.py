@@ -6,15 +6,18 @@ for the world orientations R, so that both bodies stand alike. What standing is,
 
 * from the source's rest pose, where that is a person standing upright,
 * else from a reference motion of the same skeleton in which a person stands upright,
-* else from the motion itself: the trunk's axes are those that lie nearest to the body's, knees and
-  elbows tell their hinges by bending.
+* else from the motion itself, where it is upright: bones, and pairs of limbs, say how they lie in
+  the frame of the joint that they hang on, knees and elbows tell their hinges by bending, and what
+  is left is taken from the mean pose. Rigs drawn along the axes are known by their bones; there,
+  what was learned is put on the axis that it lies near to.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import permutations, product
 from typing import TYPE_CHECKING
 
 import roma
@@ -51,44 +54,69 @@ _ABOVE = {"lower_arm": "upper_arm", "hand": "lower_arm", "lower_leg": "upper_leg
 # Axes about which elbows (left, right) and knees bend where the body stands in a T-pose facing +z.
 ELBOW = {"left": (0.0, -1.0, 0.0), "right": (0.0, 1.0, 0.0)}
 KNEE = (1.0, 0.0, 0.0)
-# Axes drawn along the body's are within this of them, on average over a motion.
+# In rigs drawn along the axes, what a motion tells on average is within this of an axis,
 _SNAP = 30.0  # degrees
-_ALONG = 3.0  # degrees between a bone and the axis along which it is drawn
+_ALONG, _EXACT = 3.0, 0.5  # and a bone within this of its axis, most bones within this,
+_ACROSS = 12.0  # or within this of being square to the hinge about which it turns.
+_UPRIGHT, _SHARE = 0.7, 0.05  # of a trunk one long, what points up; of frames, those that must
 SHORT = 0.01  # metres; a shorter bone tells no direction
-_UP = torch.tensor([0.0, 1.0, 0.0])
+_STRIDE = 0.1  # of legs one long, how far one may point ahead of the other in a stance
+_LEFT, _UP = torch.tensor([1.0, 0.0, 0.0]), torch.tensor([0.0, 1.0, 0.0])
 
 
 def alignment(motion: Motion, target: Skeleton, reference: Motion | None) -> dict[str, Tensor]:
     """Rotation A (3, 3) per role that both skeletons have: ``R_target = R_source @ A``.
 
-    The target's rest pose must be a standing body facing +z (`stands`).
+    The target's rest pose must be a standing body facing +z (`stands`). Warns where neither rest
+    pose nor motion tells how the source stands.
     """
-    source = motion.skeleton
-    roles = [role for role in target.roles if role in source.roles]
-    if reference is None and stands(source):
-        at_rest = torch.eye(3).expand(1, source.joints, 3, 3)
-        rest = replace(motion, root_positions=torch.zeros(1, 3), rotations=at_rest, contacts=None)
-        return _from_stance(rest, target, roles)
-    if reference is not None:
-        return _from_stance(reference, target, roles)
-    return _from_motion(motion, target, roles)
+    roles = [role for role in target.roles if role in motion.skeleton.roles]
+    stance = stance_of(motion, reference)
+    if stance is None:
+        return _from_motion(motion, target, roles)
+    return _from_stance(stance, target, roles)
+
+
+def stance_of(motion: Motion, reference: Motion | None = None) -> Motion | None:
+    """A motion of the skeleton that stands: the reference, or the rest pose, or None.
+
+    A rest pose that leans as a whole, straight from feet to shoulders, is set upright.
+    """
+    skeleton = motion.skeleton
+    if reference is not None or not upright(skeleton):
+        return reference
+    points = rest_points(skeleton)[None]
+    trunk = _up(points, skeleton, "upper_leg", "upper_arm")
+    legs = _up(points, skeleton, "foot", "upper_leg")
+    rest = torch.eye(3).repeat(1, skeleton.joints, 1, 1)
+    if (trunk * legs).sum() > math.cos(math.radians(_EXACT)):
+        rest[:, 0] = shortest_turn(trunk, _UP)
+    return replace(motion, root_positions=torch.zeros(1, 3), rotations=rest, contacts=None)
 
 
 def stands(skeleton: Skeleton) -> bool:
     """Whether the rest pose is a body standing upright with straight legs, facing +z."""
     points, roles = rest_points(skeleton), skeleton.roles
+    across = points[roles["left_upper_leg"]] - points[roles["right_upper_leg"]]
+    return upright(skeleton) and bool(across[0] > 0.9 * across.norm())
+
+
+def upright(skeleton: Skeleton) -> bool:
+    """Whether the rest pose is a body standing upright with straight legs, wherever it faces.
+
+    A step is no stance: both legs point equally far ahead.
+    """
+    points, roles = rest_points(skeleton), skeleton.roles
     at = lambda role: points[roles[role]]
     across = at("left_upper_leg") - at("right_upper_leg")
-    if across[0] < 0.9 * across.norm() or across.norm() == 0:
+    if across.norm() == 0 or across[[0, 2]].norm() < 0.9 * across.norm():
         return False
-    legs = all(
-        _unit(at(f"{side}_foot") - at(f"{side}_upper_leg"))[1] < -0.9
-        and _unit(at(f"{side}_lower_leg") - at(f"{side}_upper_leg"))[1] < -0.85
-        for side in SIDES
-    )
-    middle = (at("left_upper_leg") + at("right_upper_leg")) / 2
-    shoulders = (at("left_upper_arm") + at("right_upper_arm")) / 2
-    return bool(legs and _unit(shoulders - middle)[1] > 0.9)
+    ahead = torch.linalg.cross(_unit(across), _UP)
+    for part, straight in (("lower_leg", 0.85), ("foot", 0.9)):
+        legs = [_unit(at(f"{side}_{part}") - at(f"{side}_upper_leg")) for side in SIDES]
+        if max(leg[1] for leg in legs) > -straight or ((legs[0] - legs[1]) @ ahead).abs() > _STRIDE:
+            return False
+    return bool(_up(points[None], skeleton, "upper_leg", "upper_arm")[0, 1] > 0.95)
 
 
 def rest_points(skeleton: Skeleton) -> Tensor:
@@ -101,13 +129,31 @@ def rest_points(skeleton: Skeleton) -> Tensor:
     return points
 
 
+def limb_length(skeleton: Skeleton, limb: str, sides: Sequence[str] = SIDES) -> float:
+    """Length in metres of a limb's two long bones ("arm", "leg"), mean over sides."""
+    parts = (f"upper_{limb}", f"lower_{limb}", "foot" if limb == "leg" else "hand")
+    points, roles = rest_points(skeleton), skeleton.roles
+    joints = [[points[roles[f"{side}_{part}"]] for part in parts] for side in sides]
+    return float(sum((b - a).norm() + (c - b).norm() for a, b, c in joints) / len(sides))
+
+
 def facing(points: Tensor, skeleton: Skeleton) -> Tensor:
     """Frames (frames, 3, 3) that face as hips and shoulders do: left, up and ahead in columns."""
+    left = _across(points, skeleton) * torch.tensor([1.0, 0.0, 1.0])
+    return frame(left, _UP.expand_as(left))
+
+
+def _across(points: Tensor, skeleton: Skeleton) -> Tensor:
+    """Vectors (frames, 3) to the left, hips and shoulders counting alike."""
     at = lambda role: points[:, skeleton.roles[role]]
     hips = _unit(at("left_upper_leg") - at("right_upper_leg"))
-    shoulders = _unit(at("left_upper_arm") - at("right_upper_arm"))
-    left = (hips + shoulders) * torch.tensor([1.0, 0.0, 1.0])
-    return frame(left, _UP.expand_as(left))
+    return hips + _unit(at("left_upper_arm") - at("right_upper_arm"))
+
+
+def _up(points: Tensor, skeleton: Skeleton, lower: str, upper: str) -> Tensor:
+    """Unit vectors (frames, 3) from between two joints to between two others."""
+    between = lambda part: sum(points[:, skeleton.roles[f"{side}_{part}"]] for side in SIDES)
+    return _unit(between(upper) - between(lower))
 
 
 def frame(first: Tensor, second: Tensor) -> Tensor:
@@ -160,9 +206,23 @@ def _from_stance(stance: Motion, target: Skeleton, roles: list[str]) -> dict[str
 def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str, Tensor]:
     """From whatever the person does, most of it upright."""
     source, points, orientations = motion.skeleton, motion.positions(), motion.orientations()
-    ahead = facing(points, source)
+    trunk = _up(points, source, "upper_leg", "upper_arm")
+    rises = trunk[:, 1] > _UPRIGHT
+    if rises.float().mean() >= _SHARE:
+        points, orientations = points[rises], orientations[rises]
+        ahead = facing(points, source)
+    else:
+        warnings.warn(
+            f"{motion!r}: the rest pose is no standing body, and the trunk is upright in hardly any "
+            "frame, so how the axes of the joints lie is a guess; pass reference=, a motion of this "
+            "skeleton in which a person stands upright.",
+            stacklevel=5,
+        )
+        left = _across(points, source)
+        ahead = frame(left - (left * trunk).sum(-1, keepdim=True) * trunk, trunk)
     world = {role: orientations[:, source.roles[role]] for role in roles}
     axes: dict[str, Tensor] = {}
+    drawn = _drawn_along_axes(source)
     for joint, child in TRUNK:
         if joint not in roles:
             continue
@@ -170,7 +230,8 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
         if theirs is None and joint == "head" and "neck" in axes:
             axes[joint] = axes["neck"]
         else:
-            axes[joint] = _snapped(_mean(world[joint].mT @ ahead), ours, theirs)
+            seen = _mean(world[joint].mT @ ahead)
+            axes[joint] = _trunk_axes(seen, ours, theirs, _pair(source, joint), drawn)
     for side in SIDES:
         at = lambda part, side=side: points[:, source.roles[f"{side}_{part}"]]
         for parts, rest_hinge in (
@@ -192,7 +253,10 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
                 theirs = theirs if here is None else here
                 if ours is None or theirs is None:
                     continue
-                axis = _nearest_axis((world[joint].mT @ hinge[..., None]).mean(0)[:, 0])
+                axis = (world[joint].mT @ hinge[..., None]).mean(0)[:, 0]
+                nearest = _nearest_axis(axis)
+                if drawn and (nearest @ _unit(theirs)).abs() < math.sin(math.radians(_ACROSS)):
+                    axis = nearest
                 axes[joint] = frame(theirs, axis) @ frame(ours, torch.tensor(rest_hinge)).mT
     return axes
 
@@ -202,33 +266,69 @@ def _mean(rotations: Tensor) -> Tensor:
     return roma.special_procrustes(rotations.mean(0))
 
 
-def _snapped(rotation: Tensor, ours: Tensor | None, theirs: Tensor | None) -> Tensor:
-    """The rotation with axes along the axes that is meant by one that a body's sway has blurred.
+def _trunk_axes(
+    seen: Tensor, ours: Tensor, theirs: Tensor | None, pair: Tensor | None, drawn: bool
+) -> Tensor:
+    """Axes (3, 3) of a joint of the trunk, from its bone and from the pair of limbs that it bears.
 
-    Where the source's bone lies along an axis, it is one that brings the target's bone there,
-    else the nearest, if that lies near.
+    seen : (3, 3), the axes as the mean pose tells them, blurred by all that the body does.
+    ours, theirs : (3,), the bone in the target's frame and in the source's, if it has one.
+    pair : (3,), from right to left between limbs that hang on the source's joint, if there are any.
+    drawn : whether the source's rig is drawn along the axes.
     """
-    turns = torch.tensor([
-        [[sign[i] * (p[i] == j) for j in range(3)] for i in range(3)]
-        for p in permutations(range(3)) for sign in product((1.0, -1.0), repeat=3)
-    ])  # fmt: skip
-    turns = turns[torch.linalg.det(turns) > 0]
-    if ours is not None and theirs is not None:
-        fitting = turns[turns @ _unit(ours) @ _unit(theirs) > math.cos(math.radians(_ALONG))]
-        if len(fitting):
-            return fitting[(fitting * rotation).sum((1, 2)).argmax()]
-    nearest = turns[(turns * rotation).sum((1, 2)).argmax()]
-    angle = torch.rad2deg(roma.rotmat_geodesic_distance(nearest, rotation))
-    return nearest if angle < _SNAP else rotation
+    second = _UP if ours[0].abs() > ours[1].abs() else _LEFT  # besides the bone: of a collar, up
+    if not drawn:
+        if pair is not None:
+            return frame(pair, seen @ _UP if theirs is None else theirs)
+        return seen if theirs is None else frame(theirs, seen @ second) @ frame(ours, second).mT
+    along, left = _along(theirs), _along(pair)
+    if along is not None:
+        beside = pair if pair is not None and second is _LEFT else _nearest_axis(seen @ second)
+        return frame(along, beside) @ frame(ours, second).mT
+    left = _nearest_axis(seen @ _LEFT) if left is None else left
+    return frame(left, _nearest_axis(seen @ _UP))
 
 
-def _nearest_axis(direction: Tensor) -> Tensor:
-    """The coordinate axis next to a direction (3,), if it lies near; else the direction."""
+def _drawn_along_axes(skeleton: Skeleton) -> bool:
+    """Whether most bones lie along coordinate axes in the frames of their joints, and legs beside
+    each other do."""
+    limbs = tuple((f"{side}_{part}", f"{side}_{child}") for side in SIDES for part, child in LIMBS)
+    bones = [bone(skeleton, *pair) for pair in TRUNK + limbs if pair[0] in skeleton.roles]
+    bones = [each for each in bones if each is not None]
+    legs = _pair(skeleton, "hips")
+    if legs is not None and _axis_near(legs, _EXACT) is None:
+        return False
+    return sum(_axis_near(each, _EXACT) is not None for each in bones) > len(bones) / 2
+
+
+def _pair(skeleton: Skeleton, joint: str) -> Tensor | None:
+    """From right to left (3,) between the legs that hang on the hips, or collars or arms on a chest."""
+    for part in {"hips": ("upper_leg",), "chest": ("shoulder", "upper_arm")}.get(joint, ()):
+        if all(f"{side}_{part}" in skeleton.roles for side in SIDES):
+            ends = [skeleton.below(joint, f"{side}_{part}") for side in SIDES]
+            if all(end is not None for end in ends) and (ends[0] - ends[1]).norm() > SHORT:
+                return ends[0] - ends[1]
+    return None
+
+
+def _along(direction: Tensor | None) -> Tensor | None:
+    """The coordinate axis along which a direction (3,) is drawn, if there is one."""
+    return None if direction is None else _axis_near(direction, _ALONG)
+
+
+def _axis_near(direction: Tensor, degrees: float) -> Tensor | None:
+    """The coordinate axis (3,) within so many degrees of a direction (3,), if there is one."""
     direction = _unit(direction)
     largest = direction.abs().argmax()
     axis = torch.zeros(3)
     axis[largest] = direction[largest].sign()
-    return axis if torch.rad2deg(torch.arccos(direction @ axis)) < _SNAP else direction
+    return axis if direction @ axis > math.cos(math.radians(degrees)) else None
+
+
+def _nearest_axis(direction: Tensor) -> Tensor:
+    """The coordinate axis next to a direction (3,), if it lies near; else the direction."""
+    axis = _axis_near(direction, _SNAP)
+    return _unit(direction) if axis is None else axis
 
 
 def _unit(vectors: Tensor) -> Tensor:

@@ -10,30 +10,40 @@ In this order:
    the source without a role, such as those of a longer spine, fold into these.
 2. The way of the hips is scaled by the ratio of the legs' lengths, in all three directions: speeds
    scale with the body. Ankles follow on ways scaled alike, relative to the floor.
-3. Feet are brought to the ground and held still while in contact (`feet.planting`), the hips are
-   shifted up or down with them, and lowered where a leg would not reach.
+3. Feet are brought to the ground and held still while in contact (`feet.planting`). The hips follow
+   those that stand, so that their legs stay as stretched as they were, and come down where a leg
+   that must stand would not reach. A foot that does not touch moves nothing.
 4. Legs reach for the ankles by inverse kinematics, knees bending the way they did; hands keep
    their way relative to the shoulder, scaled by the ratio of the arms' lengths.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import torch
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from scipy.ndimage import gaussian_filter1d
 from torch import Tensor
 
 from ..errors import RetargetError
-from ..feet.planting import Foot, bridged, find_contacts, levelled, plant
+from ..feet.planting import Foot, Sole, find_contacts, let_go, levelled, plant
 from ..ik import two_bone
 from ..ik.turns import shortest_turn
 from ..roles import SIDES
 from ..skeleton import Skeleton
-from .rest_alignment import ELBOW, SHORT, alignment, bone, rest_points, stands
+from .hips import follow, sink, stretched
+from .rest_alignment import (
+    ELBOW,
+    SHORT,
+    alignment,
+    bone,
+    limb_length,
+    rest_points,
+    stance_of,
+    stands,
+)
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -51,8 +61,8 @@ _BONES = tuple(
 )
 _TOE_HEIGHT = 0.0251 / 0.8007  # of a flat foot's toe joint above the floor, in lengths of the leg
 _STRAIGHT = 0.005  # metres off the line between its ends, of the middle of a limb
-_REACH, _STRETCHED = 0.998, 0.9999  # shares of its length that a leg may be stretched to
-_SINK_TIME, _SETTLE_TIME = 0.06, 0.35  # seconds
+_SETTLE_TIME = 0.35  # seconds
+_HANGING = 0.7  # radians by which feet are pitched that hang in the air, or point at the viewer
 
 
 @torch.no_grad()
@@ -65,7 +75,7 @@ def retarget(
     ----------
     motion : from any source whose joints are called as people call them.
     skeleton : where to; `Skeleton.canonical` if None. Its rest pose must be a standing body that
-        faces +z. A motion that is on it already comes back as it is.
+        faces +z. A motion that is on it already, whatever its joints are called, is not changed.
     reference : a motion of the source's skeleton in which a person stands upright, arms hanging or
         spread. It tells how joint axes lie where the rest pose is no standing body; without it
         they are guessed from the motion itself, for which it should be upright most of the time.
@@ -79,6 +89,8 @@ def retarget(
     ------
     RetargetError : a skeleton lacks roles or limbs, its rest pose can't be used, or there is no
         frame.
+
+    Warns where neither rest pose, reference nor motion tells how the source stands.
     """
     skeleton = Skeleton.canonical() if skeleton is None else skeleton
     if not _moves(motion) or not isinstance(skeleton, Skeleton):
@@ -88,6 +100,8 @@ def retarget(
         )
     if motion.skeleton.matches(skeleton):
         return motion
+    if _same_body(motion.skeleton, skeleton):
+        return replace(motion, skeleton=skeleton)
     _check(motion, skeleton, reference)
     return _retarget(motion, skeleton, reference)
 
@@ -95,6 +109,13 @@ def retarget(
 def _moves(value: object) -> bool:
     """Is it a Motion? Told by its skeleton: `Motion.retarget` hands over to this module."""
     return isinstance(getattr(value, "skeleton", None), Skeleton)
+
+
+def _same_body(one: Skeleton, other: Skeleton) -> bool:
+    """Whether two skeletons differ in the names of their joints alone, not in what these mean."""
+    if one.joints != other.joints or one.roles != other.roles:
+        return False
+    return replace(one, names=other.names, roles=None).matches(other)
 
 
 def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None:
@@ -141,28 +162,30 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
 def _retarget(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> Motion:
     points, orientations = motion.positions(), motion.orientations()
     source = motion.skeleton.roles
-    turned = {
-        role: orientations[:, source[role]] @ turn
-        for role, turn in alignment(motion, skeleton, reference).items()
-    }
+    axes = alignment(motion, skeleton, reference)
+    turned = {role: orientations[:, source[role]] @ turn for role, turn in axes.items()}
     world = _fill(turned, skeleton)
-    scale = _length(skeleton, "leg") / _length(motion.skeleton, "leg")
+    scale = limb_length(skeleton, "leg") / limb_length(motion.skeleton, "leg")
     at = {role: points[:, joint] * scale for role, joint in source.items()}
-    feet = {}
-    for i, side in enumerate(SIDES):
-        given = None if motion.contacts is None else motion.contacts[:, 2 * i : 2 * i + 2]
-        feet[side] = _foot(at, world, side, skeleton, motion.fps, given)
+    soles = [_sole(side, skeleton) for side in SIDES]
+    feet = _feet(at, world, soles, motion, _toes_up(stance_of(motion, reference), axes))
 
     legs = torch.stack([skeleton.below("hips", f"{side}_upper_leg") for side in SIDES])
     middle = (at["left_upper_leg"] + at["right_upper_leg"]) / 2
     hips = middle - _turn(world["hips"], legs.mean(0))
-    # Where the floor lies, and how high the ankles, both feet agree on but for their unevenness.
-    hips[:, 1] += _lift(feet.values(), motion.fps)
-    hips[:, 1] -= _sink(hips, world["hips"], feet, at, skeleton, motion.fps)
+    starts = hips + (world["hips"] @ legs.T).permute(2, 0, 1)
+    stretch = stretched(at, motion.skeleton, skeleton)
+    moved = follow(feet, starts, stretch, motion.fps)
+    moved[:, 1] -= sink(feet, starts + moved, stretch, skeleton, motion.fps)
 
-    for side, leg in zip(SIDES, legs, strict=True):
-        foot = feet[side]
-        start = hips + _turn(world["hips"], leg)
+    planted = zip(feet, starts + moved, stretch, strict=True)
+    feet = []
+    for side, (foot, start, length) in zip(SIDES, planted, strict=True):
+        if not foot.touches.any():
+            foot = replace(foot, ankle=foot.ankle + moved, shift=moved)
+        longest = limb_length(skeleton, "leg", [side])
+        foot = let_go(foot, start, length, longest, motion.fps)
+        feet.append(foot)
         world |= _leg(start, foot.ankle, at, world, side, skeleton)
         world |= {f"{side}_foot": foot.foot, f"{side}_toes": foot.toes}
         world |= _arm(at, world, side, motion.skeleton, skeleton, scale)
@@ -170,9 +193,9 @@ def _retarget(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> M
         motion,
         skeleton=skeleton,
         # a root above the hips, as some rigs have it, goes with them
-        root_positions=hips - rest_points(skeleton)[skeleton.roles["hips"]],
+        root_positions=hips + moved - rest_points(skeleton)[skeleton.roles["hips"]],
         rotations=_local(world, skeleton),
-        contacts=torch.cat([foot.contacts for foot in feet.values()], -1),
+        contacts=torch.cat([foot.contacts for foot in feet], -1),
     )
 
 
@@ -187,38 +210,54 @@ def _fill(turned: dict[str, Tensor], skeleton: Skeleton) -> dict[str, Tensor]:
     return world
 
 
-def _length(skeleton: Skeleton, limb: str) -> float:
-    """Length in metres of the limb's two long bones, mean of left and right."""
-    parts = (f"upper_{limb}", f"lower_{limb}", "foot" if limb == "leg" else "hand")
-    points, roles = rest_points(skeleton), skeleton.roles
-    joints = [[points[roles[f"{side}_{part}"]] for part in parts] for side in SIDES]
-    return float(sum((b - a).norm() + (c - b).norm() for a, b, c in joints) / len(SIDES))
+def _sole(side: str, skeleton: Skeleton) -> Sole:
+    sole, tip = bone(skeleton, f"{side}_foot", f"{side}_toes"), None
+    if f"{side}_toes" in skeleton.roles:
+        tip = bone(skeleton, f"{side}_toes", "")
+    height = _TOE_HEIGHT * limb_length(skeleton, "leg")
+    heights = torch.tensor([height - float(sole[1]), height])
+    return Sole(sole, torch.zeros(3) if tip is None else tip, heights)
 
 
-def _foot(
+def _toes_up(stance: Motion | None, axes: dict[str, Tensor]) -> Tensor | None:
+    """Radians (2,) by which toes point up while the body stands, if that is known and can be."""
+    if stance is None:
+        return None
+    world = stance.orientations()
+    feet = [
+        world[:, stance.skeleton.roles[f"{side}_foot"]] @ axes[f"{side}_foot"] for side in SIDES
+    ]
+    feet = torch.stack(feet)
+    pitches = torch.atan2(feet[..., 1, 2], feet[..., 1, 1]).median(1).values
+    return pitches if pitches.abs().max() < _HANGING else None
+
+
+def _feet(
     at: dict[str, Tensor],
     world: dict[str, Tensor],
-    side: str,
-    skeleton: Skeleton,
-    fps: float,
-    contacts: Tensor | None,
-) -> Foot:
-    """One foot on the ground, from where it is scaled."""
-    ankle, foot = at[f"{side}_foot"], world[f"{side}_foot"]
-    sole = bone(skeleton, f"{side}_foot", f"{side}_toes")
-    pointing, tip = foot, None  # where the toes point, if they are a joint
-    if f"{side}_toes" in world:
-        pointing, tip = world[f"{side}_toes"], bone(skeleton, f"{side}_toes", "")
-    toes = at.get(f"{side}_toes")
-    if toes is None:
-        toes = ankle + _turn(foot, sole)
-    foot = levelled(foot, ankle, toes, fps)
-    if contacts is None:
-        contacts = find_contacts(ankle, toes, foot, _speed(at, fps), fps)
-    toe_height = _TOE_HEIGHT * _length(skeleton, "leg")
-    heights = torch.tensor([toe_height - float(sole[1]), toe_height])
-    tip = torch.zeros(3) if tip is None else tip
-    return plant(ankle, foot, pointing, contacts, sole, tip, heights)
+    soles: list[Sole],
+    motion: Motion,
+    stance: Tensor | None,
+) -> list[Foot]:
+    """Both feet on the ground, from where they are scaled. stance : see `levelled`."""
+    fps = motion.fps
+    ankles = torch.stack([at[f"{side}_foot"] for side in SIDES])
+    drawn = torch.stack([world[f"{side}_foot"] for side in SIDES])
+    toes = torch.stack([
+        at.get(f"{side}_toes", ankle + _turn(foot, sole.toes))
+        for side, ankle, foot, sole in zip(SIDES, ankles, drawn, soles, strict=True)
+    ])  # fmt: skip
+    level = levelled(drawn, ankles, toes, fps, stance)
+    if motion.contacts is None:
+        contacts = find_contacts(ankles, toes, level, _speed(at, fps), fps)
+    else:
+        contacts = torch.stack([motion.contacts[:, :2], motion.contacts[:, 2:]])
+    feet = []
+    for i, foot in enumerate(level):
+        # where the toes point, if they are a joint
+        pointing = world.get(f"{SIDES[i]}_toes", drawn[i])
+        feet.append(plant(ankles[i], foot, pointing, contacts[i], soles[i]))
+    return feet
 
 
 def _speed(at: dict[str, Tensor], fps: float) -> Tensor:
@@ -230,50 +269,6 @@ def _speed(at: dict[str, Tensor], fps: float) -> Tensor:
     return torch.gradient(torch.from_numpy(smooth), spacing=1 / fps, dim=0)[0].norm(dim=-1)
 
 
-def _lift(feet: Iterable[Foot], fps: float) -> Tensor:
-    """Metres (frames,) by which the body is raised: as the ankles of flat feet were.
-
-    Then legs are bent as they were.
-    """
-    lifts = []
-    for foot in feet:
-        heel = foot.contacts[:, 0]
-        lifts.append(bridged(foot.shift, heel if heel.any() else foot.contacts[:, 1])[:, 1])
-    lift = torch.stack(lifts).mean(0).numpy()
-    return torch.from_numpy(gaussian_filter1d(lift, _SETTLE_TIME * fps, mode="nearest"))
-
-
-def _sink(
-    hips: Tensor,
-    orientations: Tensor,
-    feet: dict[str, Foot],
-    at: dict[str, Tensor],
-    skeleton: Skeleton,
-    fps: float,
-) -> Tensor:
-    """Metres (frames,) by which the body must come down for its legs to reach the ankles.
-
-    No leg is stretched beyond `_REACH`, or beyond how far it was.
-
-    hips : (frames, 3) metres; orientations : theirs, (frames, 3, 3).
-    """
-    leg = _length(skeleton, "leg")
-    needed = torch.zeros(len(hips))
-    for side, foot in feet.items():
-        was = (at[f"{side}_foot"] - at[f"{side}_upper_leg"]).norm(dim=-1)
-        reach = was.clamp(min=_REACH * leg, max=_STRETCHED * leg)
-        start = hips + _turn(orientations, skeleton.below("hips", f"{side}_upper_leg"))
-        way = start - foot.ankle
-        level = (way[:, [0, 2]] ** 2).sum(-1)
-        needed = needed.maximum(way[:, 1] - (reach**2 - level).clamp(min=0.01).sqrt())
-    needed = needed.where(needed > 1e-4, 0.0)
-    if not needed.any():
-        return needed
-    sigma = _SINK_TIME * fps
-    widest = maximum_filter1d(needed.numpy(), 2 * round(2 * sigma) + 1)
-    return torch.from_numpy(gaussian_filter1d(widest, sigma, truncate=2))
-
-
 def _leg(
     start: Tensor, ankle: Tensor, at: dict, world: dict, side: str, skeleton: Skeleton
 ) -> dict[str, Tensor]:
@@ -281,8 +276,9 @@ def _leg(
     thigh, shank, foot = (f"{side}_{part}" for part in ("upper_leg", "lower_leg", "foot"))
     ahead = world[thigh][..., 2]
     aside = _aside(at[thigh], at[shank], at[foot])
-    backwards = (aside * ahead).sum(-1, keepdim=True) <= 0
-    knee = _bend(aside.masked_fill(backwards, 0.0), ahead)
+    # A knee that went backwards lies where a straight one does.
+    aside = aside + (-(aside * ahead).sum(-1, keepdim=True)).clamp(min=0) * ahead
+    knee = _bend(aside, ahead)
     offsets = (skeleton.below(*pair) for pair in pairwise((thigh, shank, foot)))
     upper, lower = two_bone(start, ankle, knee, *offsets)
     return {thigh: upper, shank: upper @ lower}
@@ -293,7 +289,7 @@ def _arm(
 ) -> dict[str, Tensor]:
     """World orientations of upper and lower arm: as the source's, swung for the hand's place."""
     upper, lower, hand = (f"{side}_{part}" for part in ("upper_arm", "lower_arm", "hand"))
-    ratio = _length(skeleton, "arm") / _length(source, "arm") / scale
+    ratio = limb_length(skeleton, "arm") / limb_length(source, "arm") / scale
     # In the frame of the upper arm, elbows lie on one side; where the arm is straight, on average.
     aside = _aside(at[upper], at[lower], at[hand])
     side_of_elbow = (world[upper].mT @ aside[..., None]).mean(0)[:, 0]

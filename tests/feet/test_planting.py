@@ -1,0 +1,69 @@
+"""What a foot that stands tells: flat feet from those on their toes, and contact from hovering."""
+
+from __future__ import annotations
+
+import pytest
+import roma
+import torch
+
+from motionlab.feet.planting import find_contacts, levelled
+
+FPS, FRAMES = 30, 60
+SOLE = torch.tensor([0.0, -0.0749, 0.0906])
+
+
+def pitched(degrees: float, frames: int = FRAMES) -> torch.Tensor:
+    """Orientations (frames, 3, 3) whose toes point down by so much."""
+    angle = torch.full((frames,), float(degrees))
+    return roma.euler_to_rotmat("X", angle[:, None], degrees=True)
+
+
+def standing(*feet: torch.Tensor, lift: float = 0.0) -> tuple[torch.Tensor, torch.Tensor]:
+    """Ankles and toes (2, frames, 3) of feet whose toes rest side by side, one perhaps higher."""
+    toes = torch.tensor([[0.1, 0.025, 0.0], [-0.1, 0.025 + lift, 0.0]])[:, None].expand(
+        2, FRAMES, 3
+    )
+    reach = torch.stack([foot @ SOLE for foot in feet])
+    return toes - reach, toes
+
+
+def pitch(feet: torch.Tensor) -> torch.Tensor:
+    """Degrees (2, frames) by which toes point down."""
+    return -torch.rad2deg(torch.atan2(feet[..., 1, 2], feet[..., 1, 1]))
+
+
+@pytest.mark.parametrize("tilt", [-20.0, 0.0, 12.0])
+def test_a_foot_that_stands_flat_is_made_level(tilt):
+    feet = (pitched(tilt), pitched(tilt))
+    found = levelled(torch.stack(feet), *standing(*feet), FPS)
+    assert pitch(found).abs().max() < 0.1
+
+
+@pytest.mark.parametrize("stance", [None, torch.zeros(2)])
+@pytest.mark.parametrize("raised", [25.0, 45.0, 80.0, 120.0])
+def test_a_foot_on_its_toes_teaches_nothing(stance, raised):
+    """It was turned by what it stood like: by 60 to 170 degrees in every frame of a dance."""
+    feet = (pitched(0), pitched(raised))
+    found = levelled(torch.stack(feet), *standing(*feet), FPS, stance)
+    assert (pitch(found) - torch.tensor([[0.0], [raised]])).abs().max() < 0.1
+
+
+def test_both_feet_on_their_toes_are_level_as_in_the_stance():
+    feet = (pitched(60), pitched(70))
+    stance = torch.deg2rad(torch.tensor([10.0, 12.0]))  # so much toes point up while it stands
+    found = levelled(torch.stack(feet), *standing(*feet), FPS, stance)
+    assert (pitch(found) - torch.tensor([[70.0], [82.0]])).abs().max() < 0.1
+
+
+def test_a_foot_flat_for_a_while_is_level_then_though_it_mostly_stands_on_its_toes():
+    foot = torch.cat([pitched(-10, 20), pitched(15, 40)])
+    found = levelled(torch.stack([foot, foot]), *standing(foot, foot), FPS)
+    assert pitch(found)[:, :20].abs().max() < 0.1
+
+
+@pytest.mark.parametrize(("lift", "touches"), [(0.0, True), (0.03, True), (0.12, False)])
+def test_a_foot_held_still_in_the_air_does_not_touch(lift, touches):
+    feet = torch.stack([pitched(0), pitched(0)])
+    contacts = find_contacts(*standing(*feet, lift=lift), feet, torch.zeros(FRAMES), FPS)
+    assert contacts[0].all()
+    assert bool(contacts[1].any()) == touches
