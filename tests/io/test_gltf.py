@@ -15,11 +15,13 @@ from glb_reader import Glb
 from gltf_files import mixamo
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from other_rigs import along_bones, random_axes, redrawn, sitting
 from scipy.spatial.transform import Rotation
 
 from motionlab import Motion, MotionLabError, Skeleton, datasets, write_gltf
 from motionlab.errors import GltfError, MotionError, ViewerError
 from motionlab.io.bvh import parse_bvh
+from motionlab.io.gltf_mesh import bind_pose
 from motionlab.kinematics import yaw_matrix
 from motionlab.retargeting.rest_alignment import stands
 from motionlab.viewer.pictures.body import body
@@ -208,6 +210,17 @@ def test_where_the_body_faced_does_not_matter_for_the_pose_at_rest(walk, write):
     turns[:, 0] = yaw_matrix(torch.linspace(0, 6, len(folded))) @ turns[:, 0]
     spinning = write(replace(folded, rotations=turns)).worlds()
     np.testing.assert_allclose(spinning, write(folded).worlds(), atol=1e-4)
+
+
+@pytest.mark.parametrize("axes", [sitting, random_axes, lambda s: along_bones(s, -torch.eye(3)[1])])
+def test_how_axes_lie_does_not_matter_for_the_pose_at_rest(axes):
+    """Also a root whose axes are upside down: then its own heading says nothing."""
+    motion = datasets.gaits.make(seconds=4, speed=1.3, turn_rate=0.8)
+    bound = bind_pose(redrawn(motion, axes(motion.skeleton))).positions()[0]
+    at = {role: bound[joint] for role, joint in motion.skeleton.roles.items()}
+    across = at["left_upper_leg"] - at["right_upper_leg"]
+    trunk = at["head"] - at["hips"]
+    assert across[0] > 0.99 * across.norm() and trunk[1] > 0.99 * trunk.norm()
 
 
 def test_rest_pose_of_a_person_is_kept(walk, write):

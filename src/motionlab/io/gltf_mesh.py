@@ -16,7 +16,7 @@ import torch
 
 from ..kinematics import heading, yaw_matrix
 from ..motion import Motion
-from ..retargeting.rest_alignment import stands
+from ..retargeting.rest_alignment import facing, stands
 from ..roles import SIDES
 from ..skeleton import Skeleton
 
@@ -47,7 +47,11 @@ def bind_pose(motion: Motion) -> Motion:
     pose = torch.eye(3).expand(skeleton.joints, 3, 3)
     if not rest_stands(skeleton):
         rotations = motion.rotations.detach().cpu().double()
-        ahead = yaw_matrix(-heading(rotations[:, 0])) @ rotations[:, 0]
+        if skeleton.roles.keys() >= _STANDING:  # axes of a root may lie anyhow, also upside down
+            turn = facing(motion.positions().detach().cpu(), skeleton).double()
+        else:
+            turn = yaw_matrix(heading(rotations[:, 0]))
+        ahead = turn.mT @ rotations[:, 0]
         mean = torch.cat([ahead[:, None], rotations[:, 1:]], dim=1).mean(0)
         pose = roma.special_procrustes(mean)
     return Motion(skeleton, torch.zeros(1, 3), pose[None], 1)
