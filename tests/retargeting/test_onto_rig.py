@@ -103,6 +103,19 @@ def test_joints_without_a_role_stay_as_they_mostly_are():
     assert straight.min() > 0.999  # as where it stands
 
 
+def test_feet_may_end_at_the_ankle():
+    """They stand where they do with toes of human size, which is not so far from there."""
+    kept = [i for i, name in enumerate(LARGER.names) if "Toes" not in name]
+    bare = Skeleton(
+        [LARGER.names[i] for i in kept],
+        [kept.index(LARGER.parents[i]) if i else -1 for i in kept],
+        LARGER.offsets[kept],
+    )
+    found = onto_rig(WALK, any_rig.drawn(stance(bare), any_rig.random_axes(19, 2)))
+    assert found.skeleton.end_parents == ()
+    torch.testing.assert_close(found.positions(), WANTED.positions()[:, kept], rtol=0, atol=2e-3)
+
+
 def test_other_axes_are_the_same_body():
     axes = any_rig.random_axes(21, 3)
     twin = reaxed(any_rig.drawn(stance(), axes).skeleton, axes)

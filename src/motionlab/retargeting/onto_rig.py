@@ -20,8 +20,9 @@ from torch import Tensor
 
 from ..errors import RetargetError
 from ..motion import Motion
+from ..roles import SIDES
 from ..skeleton import Skeleton
-from .rest_alignment import alignment, facing, frame, rest_points, stands
+from .rest_alignment import alignment, bone, facing, frame, rest_points, stands
 from .retarget import NEEDED, retarget
 from .stance import find_stance
 
@@ -38,7 +39,8 @@ def onto_rig(motion: Motion, rig: Motion, *, reference: Motion | None = None) ->
     ----------
     motion : from any source whose joints are called as people call them.
     rig : a file of the rig, as it was read. Unless its rest pose is a standing body, a person should
-        stand in its motion; one frame is enough.
+        stand in its motion; one frame is enough. Feet that end at the ankle get toes of human size
+        to stand on, which the result is without.
     reference : of the source's skeleton, as for `retarget`.
 
     Returns
@@ -59,7 +61,7 @@ def onto_rig(motion: Motion, rig: Motion, *, reference: Motion | None = None) ->
     if any(role not in rig.skeleton.roles for role in NEEDED):
         return retarget(motion, rig.skeleton)  # which says what is missing
     axes = standing(rig)
-    twin = retarget(motion, reaxed(rig.skeleton, axes), reference=reference)
+    twin = retarget(motion, _with_toes(reaxed(rig.skeleton, axes)), reference=reference)
     rotations = _in_axes(twin.rotations, twin.skeleton, axes.mT)
     return replace(twin, skeleton=rig.skeleton, rotations=rotations)
 
@@ -115,6 +117,25 @@ def reaxed(skeleton: Skeleton, axes: Tensor) -> Skeleton:
     offsets[0] = skeleton.offsets[0]
     ends = (axes[list(skeleton.end_parents)] @ skeleton.end_offsets[..., None])[..., 0]
     return replace(skeleton, offsets=offsets, end_offsets=ends)
+
+
+def _with_toes(twin: Skeleton) -> Skeleton:
+    """A standing skeleton with toes of human size, as end sites, on feet that end at the ankle."""
+    body = Skeleton.canonical()
+    size = _leg(twin) / _leg(body)
+    bare = [side for side in SIDES if bone(twin, f"{side}_foot", f"{side}_toes") is None]
+    toes = [body.below(f"{side}_foot", f"{side}_toes") * size for side in bare]
+    return replace(
+        twin,
+        end_parents=twin.end_parents + tuple(twin.roles[f"{side}_foot"] for side in bare),
+        end_offsets=torch.cat([twin.end_offsets, *(each[None] for each in toes)]),
+    )
+
+
+def _leg(skeleton: Skeleton) -> Tensor:
+    """Metres () from an ankle of a standing skeleton up to the hip joint."""
+    points, roles = rest_points(skeleton), skeleton.roles
+    return points[roles["left_upper_leg"], 1] - points[roles["left_foot"], 1]
 
 
 def _in_axes(rotations: Tensor, skeleton: Skeleton, axes: Tensor) -> Tensor:
