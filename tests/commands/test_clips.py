@@ -7,6 +7,7 @@ from dataclasses import replace
 import any_rig
 import pytest
 import rig_names
+import tiny_acclaim
 import torch
 from glb_reader import Glb
 
@@ -150,6 +151,15 @@ def test_clean_leaves_what_needs_none(here):
     assert same(read_bvh("x.bvh"), WALK, 0.02)
 
 
+def test_clean_of_a_flight(here, capsys):
+    """Nobody touches a floor that is rushing by."""
+    flying = WALK.root_positions + torch.tensor([0.0, 0.0, 9.0]) * torch.arange(30)[:, None] / 30
+    write_bvh(replace(WALK, root_positions=flying), "flies.bvh")
+    assert main(["clean", "flies.bvh", "--out", "x.bvh"]) == 0
+    assert "no toe rests, so that nothing was changed" in capsys.readouterr().out
+    assert same(read_bvh("x.bvh"), read_bvh("flies.bvh"))
+
+
 def test_look_makes_a_page_that_needs_nothing_else(here, capsys, monkeypatch):
     assert main(["look", "walk.bvh"]) == 0
     assert capsys.readouterr().out.startswith("walk.html: 21 joints, 30 frames, 1.00 s, 30 fps")
@@ -223,7 +233,7 @@ def test_nothing_is_overwritten_unasked(here, capsys, command):
 BAD = {
     "no such file": (["none.bvh", "--out", "x.bvh"], "none.bvh: there is no such file"),
     "no suffix": (["walk.bvh", "--out", "x"], "x: ends in none of .bvh, .glb"),
-    "another suffix": (["walk.bvh", "--out", "x.fbx"], "name a file such as x.fbx.bvh"),
+    "another suffix": (["walk.bvh", "--out", "x.fbx"], "name a file such as x.bvh"),
     "no folder": (["walk.bvh", "--out", "none/x.bvh"], "there is no folder none; make it"),
     "empty folder": (["empty", "--out", "x"], "empty: holds no file that can be read"),
     "a folder onto a file": (["clips", "--out", "walk.bvh"], "is a folder, so this must name one"),
@@ -231,6 +241,7 @@ BAD = {
     "not a motion": (["clips/notes.txt", "--out", "x.bvh"], "notes.txt, line 1"),
     "fps 0": (["walk.bvh", "--out", "x.bvh", "--fps", "0"], "--fps 0: must be a number above 0"),
     "fps nan": (["walk.bvh", "--out", "x.bvh", "--fps", "nan"], "must be a number above 0"),
+    "fps beyond all": (["walk.bvh", "--out", "x.bvh", "--fps", "1e9"], "above 0, 1000 at most"),
     "file fps": (["walk.bvh", "--out", "x.bvh", "--file-fps", "-1"], "not a positive number"),
     "up": (["walk.bvh", "--out", "x.bvh", "--up", "w"], "up='w' is no axis"),
     "units": (["walk.bvh", "--out", "x.bvh", "--units", "ells"], "Unknown unit 'ells'"),
@@ -282,10 +293,23 @@ def test_a_rig_without_legs(here, capsys):
     assert not (here / "y.bvh").exists()
 
 
+def test_acclaim_s_skeleton_is_named_where_it_lies_elsewhere(here, capsys):
+    (here / "body.asf").write_text(tiny_acclaim.asf())
+    (here / "deep").mkdir()
+    (here / "deep" / "walk.amc").write_text(tiny_acclaim.amc(tiny_acclaim.sway(5)))
+    command = ["convert", "deep", "--out", "done"]
+    assert main(command) == 1
+    assert "--skeleton=" in capsys.readouterr().err
+    assert main([*command, "--skeleton", "body.asf"]) == 0
+    assert written(here / "done") == {"walk.bvh"}
+    assert main(["convert", "walk.bvh", "--skeleton", "body.asf", "--out", "x.bvh"]) == 1
+    assert "is a skeleton of .amc files, and walk.bvh is or holds none" in capsys.readouterr().err
+
+
 def test_two_files_that_would_be_one(here, capsys):
     write_bvh(WALK, here / "clips" / "a.BVH")
     assert main(["convert", "clips", "--out", "done", "--force"]) == 1
-    assert capsys.readouterr().err.count("several files would be written there") == 2
+    assert capsys.readouterr().err.count("would become done/a.bvh, as another file would") == 2
     assert written(here / "done") == {"more/b.bvh"}
 
 

@@ -23,11 +23,14 @@ class Clean(Written):
         moved = 100 * (cleaned.positions() - motion.positions()).norm(dim=-1).amax(0)
         feet = foot_points(motion.skeleton)
         toes = motion.contacts[:, [1, 3]]
+        if not toes.any():
+            return motion, ["no toe rests, so that nothing was changed"]
         was, is_ = (
             foot_skate(each.positions(), toes, each.skeleton, each.fps)
             for each in (motion, cleaned)
         )
+        slid = "" if was.isnan() else f", sliding {was:.1f} cm/s and now {is_:.1f}"
         return cleaned, [
-            f"toes down {toes.float().mean():.0%} of the time, sliding {was:.1f} cm/s and now "
-            f"{is_:.1f}; feet moved by up to {moved[feet].max():.1f} cm, any joint by {moved.max():.1f}"
+            f"toes down {toes.float().mean():.0%} of the time{slid}; feet moved by up to "
+            f"{moved[feet].max():.1f} cm, any joint by {moved.max():.1f}"
         ]

@@ -72,7 +72,7 @@ class Clips(Files):
         with tqdm(total=len(pairs), unit="file", leave=False, disable=unseen) as bar:
             for file, target in pairs:
                 with report.of(file, file.stem):
-                    self._check_target(target, [other for _, other in pairs])
+                    self._check_target(file, target, [other for _, other in pairs])
                     motion, said = self.read(file, how)
                     report.doubt(file, said)
                     tqdm.write(f"{target}: {self._done(do, motion, file, target)}")
@@ -111,8 +111,7 @@ class Clips(Files):
         if target.suffix.lower() not in known:
             raise MotionFileError(
                 f"--out {self.out}: ends in none of {', '.join(known)}, so it is not known what to "
-                f"write; name a file such as {self.out.name or 'out'}{suffix}, or a folder that is "
-                "there."
+                f"write; name a file such as {self.out.with_suffix(suffix)}, or a folder that is there."
             )
         if not target.parent.is_dir():
             raise MotionFileError(
@@ -120,11 +119,11 @@ class Clips(Files):
             )
         return [(self.path, target)]
 
-    def _check_target(self, target: Path, targets: list[Path]) -> None:
+    def _check_target(self, file: Path, target: Path, targets: list[Path]) -> None:
         if targets.count(target) > 1:
             raise MotionFileError(
-                f"{target}: several files would be written there, which differ in their ends alone; "
-                "rename one of them."
+                f"{file}: would become {target}, as another file would whose name differs in its end "
+                "alone; rename one of them."
             )
         if target.is_dir():
             raise MotionFileError(f"{target}: is a folder; remove it, or name another --out.")

@@ -20,6 +20,8 @@ from ..skeleton import Skeleton
 from .clips import WRITERS, Clips, as_options, write
 from .rig import CANONICAL, Rig, brought_onto
 
+MOST_FPS = 1000  # no one plays more; a slip of the finger would fill the memory
+
 
 @dataclass(kw_only=True)
 class Written(Clips):
@@ -34,8 +36,10 @@ class Written(Clips):
     these are left out. (--root is another thing: which body of a file is read.)"""
 
     def run(self) -> None:
-        if self.fps is not None and not is_positive(self.fps):
-            raise MotionLabError(f"--fps {self.fps:g}: must be a number above 0.")
+        if self.fps is not None and not (is_positive(self.fps) and self.fps <= MOST_FPS):
+            raise MotionLabError(
+                f"--fps {self.fps:g}: must be a number above 0, {MOST_FPS} at most."
+            )
         self.work(f".{self.to}", self._write_one, tuple(WRITERS))
 
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
@@ -98,6 +102,14 @@ class Convert(Brought):
 
     def onto_name(self) -> str | None:
         return None if self._asf else self.skeleton
+
+    def meet(self, files: list[Path], how: Reading) -> None:
+        if self._asf and not any(file.suffix.lower() == ".amc" for file in files):
+            raise MotionLabError(
+                f"--skeleton {self.skeleton}: is a skeleton of .amc files, and {self.path} is or holds "
+                "none; leave it out, or name a file of motion to bring the clips to its rig."
+            )
+        super().meet(files, how)
 
     def read(self, file: Path, how: Reading) -> tuple[Motion, dict[str, str]]:
         if self._asf and file.suffix.lower() == ".amc":
