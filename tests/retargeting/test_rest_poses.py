@@ -125,3 +125,40 @@ def test_the_same_body_under_other_names_is_not_changed():
     assert found.skeleton is CANONICAL
     assert torch.equal(found.rotations, motion.rotations)
     assert torch.equal(found.root_positions, motion.root_positions)
+
+
+def trunk(motion: Motion) -> torch.Tensor:
+    """Unit vectors (frames, 3) from between the hip joints to between the shoulders."""
+    points, roles = motion.positions(), motion.skeleton.roles
+    both = lambda part: sum(points[:, roles[f"{side}_{part}"]] for side in ("left", "right"))
+    return torch.nn.functional.normalize(both("upper_arm") - both("upper_leg"), dim=-1)
+
+
+def test_hips_may_lie_before_the_spine():
+    """Where the bone from the hips goes backwards, as in accad's rig, it does not tell what is up."""
+    s, walk = Skeleton.canonical(), gaits.make(seconds=3, speed=1.2)
+    offsets, behind = s.offsets.clone(), torch.tensor([0.0, -0.14, -0.09])
+    offsets[s.index("Spine")] += behind
+    offsets[s.index("Chest")] -= behind
+    walk = replace(walk, skeleton=replace(s, offsets=offsets))
+    for seed in range(3):
+        axes = roma.random_rotmat(21, generator=torch.Generator().manual_seed(seed))
+        rig = redrawn(walk, axes)
+        assert not upright(rig.skeleton)
+        off = torch.rad2deg(torch.arccos((trunk(rig.retarget()) * trunk(rig)).sum(-1).clamp(-1, 1)))
+        assert off.median() < 10
+
+
+def test_a_target_s_trunk_may_end_at_the_chest():
+    """No neck and no tip of a head hang there, of which a bone could be told."""
+    s = Skeleton.canonical()
+    names = [f"part{i}" if name in ("Neck", "Head") else name for i, name in enumerate(s.names)]
+    kept = [i for i, joint in enumerate(s.end_parents) if s.names[joint] != "Head"]
+    bare = replace(
+        s, names=names, offsets=1.1 * s.offsets,
+        end_parents=[s.end_parents[i] for i in kept], end_offsets=s.end_offsets[kept],
+    )  # fmt: skip
+    walk = gaits.make(seconds=1, speed=1.2)
+    axes = roma.random_rotmat(21, generator=torch.Generator().manual_seed(0))
+    found = redrawn(walk, axes).retarget(bare)
+    assert torch.rad2deg(torch.arccos((trunk(found) * trunk(walk)).sum(-1).clamp(-1, 1))).max() < 5

@@ -59,6 +59,8 @@ _SNAP = 30.0  # degrees
 _ALONG, _EXACT = 3.0, 0.5  # and a bone within this of its axis, most bones within this,
 _ACROSS = 12.0  # or within this of being square to the hinge about which it turns.
 _UPRIGHT, _SHARE = 0.7, 0.05  # of a trunk one long, what points up; of frames, those that must
+# A bone of the trunk tells nothing that is farther than this from where the mean pose has it.
+_COS_ASTRAY = math.cos(math.radians(45.0))
 SHORT = 0.01  # metres; a shorter bone tells no direction
 _STRIDE = 0.1  # of legs one long, how far one may point ahead of the other in a stance
 _LEFT, _UP = torch.tensor([1.0, 0.0, 0.0]), torch.tensor([0.0, 1.0, 0.0])
@@ -276,6 +278,8 @@ def _trunk_axes(
     pair : (3,), from right to left between limbs that hang on the source's joint, if there are any.
     drawn : whether the source's rig is drawn along the axes.
     """
+    if ours is None or (theirs is not None and _unit(theirs) @ (seen @ _unit(ours)) < _COS_ASTRAY):
+        ours, theirs = _UP, None  # as where hips lie before the spine, so that their bone goes back
     second = _UP if ours[0].abs() > ours[1].abs() else _LEFT  # besides the bone: of a collar, up
     if not drawn:
         if pair is not None:
