@@ -143,6 +143,18 @@ def test_a_reference_is_taken_where_it_fits():
     assert apart(clips[1].retarget(reference=found.references[1]), WALKS) < 2
 
 
+def test_what_is_said_to_stand_may_stand_with_bent_knees():
+    turns = t_pose().rotations.clone()
+    for side in ("left", "right"):
+        for part, degrees in (("upper_leg", -15.0), ("lower_leg", 32.0), ("foot", -17.0)):
+            bend = torch.tensor([degrees, 0.0, 0.0]).deg2rad()
+            turns[:, CANONICAL.role(f"{side}_{part}")] = roma.rotvec_to_rotmat(bend)
+    bent = redrawn(replace(t_pose(), rotations=turns), 1)
+    assert find_stance([bent]) is None  # nobody would look for it among a folder's clips
+    found = stances([redrawn(WALKS, 1)], CANONICAL, bent)
+    assert len(found.references[0]) == 1 and not found.said
+
+
 def test_a_reference_that_tells_nothing_is_refused():
     clips = [redrawn(STANDS, 1), redrawn(WALKS, 1)]
     with pytest.raises(RetargetError, match="another rig than all 2 clips"):

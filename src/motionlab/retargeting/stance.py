@@ -40,6 +40,7 @@ LIMITS = {
     "arm ahead": 30.0,  # the same out of the plane of the body
     "elbow": 45.0,  # from straight
 }
+_SAID = 2.0  # times these limits, for what somebody says stands: knees a little bent, say
 _STILL = 0.25  # metres a second, of the fastest joint
 _RATE = 15.0  # frames looked at in a second
 _SAMPLE = 3000  # frames of all clips together, to learn axes from
@@ -97,12 +98,12 @@ def stances(
     return Stances(found, said)
 
 
-def find_stance(motions: Sequence[Motion]) -> Motion | None:
+def find_stance(motions: Sequence[Motion], slack: float = 1.0) -> Motion | None:
     """The moments in clips of one rig in which a person stands most plainly; None if nobody does.
 
     For half a second upright, with straight legs below, arms hanging or spread, all joints nearly
     still (`LIMITS`). Places alone are asked, so it does not matter how joint axes lie. A clip shorter
-    than half a second is looked at as a whole: one frame of a T-pose will do.
+    than half a second is looked at as a whole: one frame of a T-pose will do. slack : times `LIMITS`.
 
     Returns
     -------
@@ -113,7 +114,7 @@ def find_stance(motions: Sequence[Motion]) -> Motion | None:
     for motion in motions:
         length = max(1, round(_APART * motion.fps))
         for start in range(0, len(motion), length):
-            off, first, last = _stillest(motion[start : start + length])
+            off, first, last = _stillest(motion[start : start + length], slack)
             if off < math.inf:
                 moments.append((off, motion, start + first, start + last))
     moments.sort(key=lambda moment: moment[0])
@@ -158,7 +159,8 @@ def _together(motions: Sequence[Motion], skeleton: Skeleton) -> dict[str, Tensor
     """Axes as all clips of a rig together tell them by their motion."""
     whole = sum(map(len, motions))
     its, stride = motions[0].skeleton, max(1, -(-whole // _SAMPLE))
-    some = [replace(m[::stride], skeleton=its, fps=1.0, contacts=None) for m in motions]
+    fps = motions[0].fps / stride
+    some = [replace(m[::stride], skeleton=its, fps=fps, contacts=None) for m in motions]
     return alignment(concatenate(some), skeleton, None)
 
 
@@ -178,13 +180,13 @@ def _standing(skeleton: Skeleton, axes: dict[str, Tensor]) -> Motion:
     )
 
 
-def _stillest(motion: Motion) -> tuple[float, int, int]:
+def _stillest(motion: Motion, slack: float) -> tuple[float, int, int]:
     """The half second in which a person stands most plainly: how far off, and its frames."""
     stride = max(1, round(motion.fps / _RATE))
     seen = motion[::stride]
     frames = min(len(seen), max(1, round(SECONDS * seen.fps)))
     # of each half second the mean, infinite if in one of its frames nobody stands
-    means = _off(seen).unfold(0, frames, 1).mean(-1)
+    means = _off(seen, slack).unfold(0, frames, 1).mean(-1)
     start = int(means.argmin())
     return float(means[start]), start * stride, min((start + frames) * stride, len(motion))
 
@@ -196,7 +198,7 @@ def _is_whole(skeleton: Skeleton) -> bool:
     return all(bone is not None and bone.norm() > SHORT for bone in _limb_bones(skeleton))
 
 
-def _off(motion: Motion) -> Tensor:
+def _off(motion: Motion, slack: float) -> Tensor:
     """How far (frames,) the body is from standing, 0 to some; infinite if it does not stand."""
     points, roles = motion.positions(), motion.skeleton.roles
     at = {role: points[:, roles[role]] for role in NEEDED}
@@ -220,7 +222,9 @@ def _off(motion: Motion) -> Tensor:
             "elbow": _angle(*_bones(at, side, "upper_arm", "lower_arm", "hand")),
         }.items():
             angles.setdefault(part, []).append(value)
-    shares = torch.stack([a / LIMITS[part] for part, each in angles.items() for a in each])
+    shares = torch.stack(
+        [a / (slack * LIMITS[part]) for part, each in angles.items() for a in each]
+    )
     joints = torch.stack([at[role] for role in NEEDED], 1)
     speed = torch.zeros(len(motion))
     if len(motion) > 1:
@@ -250,7 +254,7 @@ def _checked(reference: Motion, motions: Sequence[Motion]) -> Motion:
             "with the same joints."
         )
     missing = [role for role in NEEDED if role not in reference.skeleton.roles]
-    stance = None if missing else find_stance([reference])
+    stance = None if missing else find_stance([reference]) or find_stance([reference], _SAID)
     if stance is None and not missing:
         raise RetargetError(
             f"{label} can't tell how the rig stands: at no time does the body stand still in it, "
