@@ -6,7 +6,7 @@ import pytest
 import roma
 import torch
 
-from motionlab.feet.planting import find_contacts, levelled
+from motionlab.feet.planting import Sole, find_contacts, let_go, levelled, plant
 
 FPS, FRAMES = 30, 60
 SOLE = torch.tensor([0.0, -0.0749, 0.0906])
@@ -67,3 +67,19 @@ def test_a_foot_held_still_in_the_air_does_not_touch(lift, touches):
     contacts = find_contacts(*standing(*feet, lift=lift), feet, torch.zeros(FRAMES), FPS)
     assert contacts[0].all()
     assert bool(contacts[1].any()) == touches
+
+
+def test_toes_that_scrape_the_floor_in_a_swing_go_up_and_the_leg_stays_as_it_was():
+    sole = Sole(SOLE, torch.tensor([0.0, 0.0, 0.06]), torch.tensor([0.1, 0.0251]))
+    height = torch.full((FRAMES,), 0.1)
+    height[20:40] = 0.115  # in the air, toes pointing down so far that they would be in the floor
+    foot = pitched(0).clone()
+    foot[20:40] = pitched(20, 20)
+    ankle = torch.stack([0 * height, height, 0 * height], 1)
+    contacts = torch.ones(FRAMES, 2, dtype=torch.bool)
+    contacts[20:40] = False
+    hip = torch.tensor([0.0, 0.8, 0.0]).expand(FRAMES, 3)
+    stretch = (hip - ankle).norm(dim=-1)
+    found = let_go(plant(ankle, foot, foot, contacts, sole), hip, stretch, 0.8, FPS)
+    assert ((hip - found.ankle).norm(dim=-1) - stretch).abs().max() < 1e-3
+    assert (found.ankle + found.reach)[:, 1].min() > 0.025

@@ -47,6 +47,7 @@ _STEP = 0.06  # metres by which what one foot stands on is higher than what the 
 _FLAT, _NEAR_STANCE, _FLATTEST, _STEEPER = (-0.25, 0.95), (-0.45, 0.25), 0.75, 0.25
 _RESTED = 0.3  # seconds of standing that tell how a flat foot looks
 _ROLL, _ROUNDS = 0.5, 6  # radians that a heel may rise or sink about toes that are down
+_CLEAR = 0.35  # radians that toes may go up lest they scrape the floor in a swing
 _GAP = 0.02  # metres by which a leg may be too long or short for toes to be down
 _EASE = 0.15  # seconds in which a foot that left the floor, or comes to it, is let go of
 _UP = torch.tensor([0.0, 1.0, 0.0])
@@ -251,7 +252,11 @@ def let_go(planted: Foot, hip: Tensor, stretch: Tensor, longest: float, fps: flo
     # what contacts leave too short or too long is let go of after them, and taken up before them
     missing = bridged(stretch[:, None] - length, touches) * (1 - _loose(touches, fps)[:, None])
     ankle = hip + leg / length * (stretch[:, None] - missing)
-    foot = replace(foot, ankle=ankle)
+    # toes that scrape the floor in a swing go up before the ankle does
+    room = ankle[:, 1].clamp(min=float(foot.sole.heights[0] - _DIP)) - foot.sole.heights[1] + _TIP
+    clear = roma.rotmat_to_rotvec(off_the_floor(foot.foot, room, foot.sole.toes) @ foot.foot.mT)
+    clear *= (_CLEAR / clear.norm(dim=-1, keepdim=True).clamp(min=_CLEAR)) * ~touches[:, None]
+    foot = replace(foot, ankle=ankle, foot=roma.rotvec_to_rotmat(clear) @ foot.foot)
     ankle = ankle + foot.depth.clamp(min=0)[:, None] * _UP
     toes = off_the_floor(foot.toes, (ankle + foot.reach)[:, 1], foot.sole.tip)
     return replace(foot, ankle=ankle, toes=toes, shift=ankle - before)
