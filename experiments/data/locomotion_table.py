@@ -31,7 +31,6 @@ import motionlab
 from motionlab import Motion, contacts, datasets
 from motionlab.datasets import registry
 from motionlab.metrics import feet, gait
-from motionlab.retargeting.rest_alignment import rest_points
 from motionlab.roles import SIDES
 from motionlab.skeleton import Skeleton
 
@@ -40,7 +39,7 @@ LIMBS = {"hand": ("upper_arm", "lower_arm", "hand"), "foot": ("upper_leg", "lowe
 
 
 def limb_length(skeleton: Skeleton, parts: tuple[str, ...]) -> float:
-    points, roles = rest_points(skeleton), skeleton.roles
+    points, roles = skeleton.rest_points, skeleton.roles
     total = 0.0
     for side in SIDES:
         a, b, c = (points[roles[f"{side}_{part}"]] for part in parts)

@@ -22,7 +22,7 @@ from ..errors import RetargetError
 from ..motion import Motion
 from ..roles import SIDES
 from ..skeleton import Skeleton
-from .rest_alignment import alignment, bone, facing, frame, rest_points, stands
+from .rest_alignment import alignment, bone, facing, frame, stands
 from .retarget import NEEDED, retarget
 from .stance import find_stance
 
@@ -134,7 +134,7 @@ def _with_toes(twin: Skeleton) -> Skeleton:
 
 def _leg(skeleton: Skeleton) -> Tensor:
     """Metres () from an ankle of a standing skeleton up to the hip joint."""
-    points, roles = rest_points(skeleton), skeleton.roles
+    points, roles = skeleton.rest_points, skeleton.roles
     return points[roles["left_upper_leg"], 1] - points[roles["left_foot"], 1]
 
 
@@ -147,7 +147,7 @@ def _in_axes(rotations: Tensor, skeleton: Skeleton, axes: Tensor) -> Tensor:
 
 def _rest_turned(skeleton: Skeleton) -> Tensor:
     """Orientations (joints, 3, 3), all the same, that let a rest pose face +z, upright if it can."""
-    points, roles = rest_points(skeleton), skeleton.roles
+    points, roles = skeleton.rest_points, skeleton.roles
     at = lambda part: torch.stack([points[roles[f"{side}_{part}"]] for side in ("left", "right")])
     hips, shoulders, feet = at("upper_leg"), at("upper_arm"), at("foot")
     left = hips[0] - hips[1] + shoulders[0] - shoulders[1]

@@ -87,7 +87,7 @@ def stance_of(motion: Motion, reference: Motion | None = None) -> Motion | None:
     skeleton = motion.skeleton
     if reference is not None or not upright(skeleton):
         return reference
-    points = rest_points(skeleton)[None]
+    points = skeleton.rest_points[None]
     trunk = _up(points, skeleton, "upper_leg", "upper_arm")
     legs = _up(points, skeleton, "foot", "upper_leg")
     rest = torch.eye(3).repeat(1, skeleton.joints, 1, 1)
@@ -98,7 +98,7 @@ def stance_of(motion: Motion, reference: Motion | None = None) -> Motion | None:
 
 def stands(skeleton: Skeleton) -> bool:
     """Whether the rest pose is a body standing upright with straight legs, facing +z."""
-    points, roles = rest_points(skeleton), skeleton.roles
+    points, roles = skeleton.rest_points, skeleton.roles
     across = points[roles["left_upper_leg"]] - points[roles["right_upper_leg"]]
     return upright(skeleton) and bool(across[0] > 0.9 * across.norm())
 
@@ -108,7 +108,7 @@ def upright(skeleton: Skeleton) -> bool:
 
     A step is no stance: both legs point equally far ahead.
     """
-    points, roles = rest_points(skeleton), skeleton.roles
+    points, roles = skeleton.rest_points, skeleton.roles
     at = lambda role: points[roles[role]]
     across = at("left_upper_leg") - at("right_upper_leg")
     if across.norm() == 0 or across[[0, 2]].norm() < 0.9 * across.norm():
@@ -121,20 +121,10 @@ def upright(skeleton: Skeleton) -> bool:
     return bool(_up(points[None], skeleton, "upper_leg", "upper_arm")[0, 1] > 0.95)
 
 
-def rest_points(skeleton: Skeleton) -> Tensor:
-    """Points (points, 3) of the rest pose, the root at the origin."""
-    points = torch.zeros(skeleton.points, 3)
-    offsets = torch.cat([skeleton.offsets, skeleton.end_offsets])
-    for point, parent in enumerate(skeleton.point_parents):
-        if parent >= 0:
-            points[point] = points[parent] + offsets[point]
-    return points
-
-
 def limb_length(skeleton: Skeleton, limb: str, sides: Sequence[str] = SIDES) -> float:
     """Length in metres of a limb's two long bones ("arm", "leg"), mean over sides."""
     parts = (f"upper_{limb}", f"lower_{limb}", "foot" if limb == "leg" else "hand")
-    points, roles = rest_points(skeleton), skeleton.roles
+    points, roles = skeleton.rest_points, skeleton.roles
     joints = [[points[roles[f"{side}_{part}"]] for part in parts] for side in sides]
     return float(sum((b - a).norm() + (c - b).norm() for a, b, c in joints) / len(sides))
 

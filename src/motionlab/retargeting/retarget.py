@@ -40,7 +40,6 @@ from .rest_alignment import (
     alignment,
     bone,
     limb_length,
-    rest_points,
     stance_of,
     stands,
 )
@@ -193,7 +192,7 @@ def _retarget(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> M
         motion,
         skeleton=skeleton,
         # a root above the hips, as some rigs have it, goes with them
-        root_positions=hips + moved - rest_points(skeleton)[skeleton.roles["hips"]],
+        root_positions=hips + moved - skeleton.rest_points[skeleton.roles["hips"]],
         rotations=_local(world, skeleton),
         contacts=torch.cat([foot.contacts for foot in feet], -1),
     )
