@@ -156,7 +156,6 @@ def test_no_copy_is_in_two_splits():
     assert (performances.nunique() == 1).all()
 
 
-@pytest.mark.xfail(strict=True, reason="results/locomotion.json is remade when planting is mended")
 def test_measured_numbers_keep_what_was_promised():
     """results/locomotion.json: of this very list of clips, and within the limits."""
     result = json.loads((RESULTS / "locomotion.json").read_text("utf-8"))
