@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -178,6 +180,17 @@ def _confirm() -> None:
         raise MotionLabError("Nothing was downloaded; confirm with y, or pass --yes.")
 
 
+@contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Warnings as a line for the person who typed the command, without the line of code they came from."""
+    before = warnings.formatwarning
+    warnings.formatwarning = lambda message, *_, **__: f"note: {message}\n"
+    try:
+        yield
+    finally:
+        warnings.formatwarning = before
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; 0 if it went well, 1 if not, 2 for a command line that makes no sense."""
     # Windows consoles may not know every character of a path or an author's name.
@@ -191,7 +204,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Motion data and models.",
     )
     try:
-        command.run()
+        with _plain_warnings():
+            command.run()
     except MotionLabError as error:
         print(f"motionlab: {error}", file=sys.stderr)
         return 1

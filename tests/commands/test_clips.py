@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import any_rig
@@ -326,3 +327,14 @@ def test_what_fails_half_way_leaves_nothing(here, capsys, monkeypatch):
         assert "disk full" in capsys.readouterr().err
     assert main(["look", "walk.bvh"]) == 1
     assert not [p for p in written(here) if p.startswith(("x.", "walk.html", "."))]
+
+
+def test_a_warning_is_a_line_of_its_own_without_code(here, monkeypatch):
+    from motionlab.commands.info import Info
+
+    monkeypatch.setattr(Info, "run", lambda self: said.append(warnings.formatwarning(*about)))
+    said, about = [], ("clips: half of them lie", UserWarning, "loader.py", 12)
+    before = warnings.formatwarning
+    assert main(["info", "walk.bvh"]) == 0
+    assert said == ["note: clips: half of them lie\n"]
+    assert warnings.formatwarning is before

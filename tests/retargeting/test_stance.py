@@ -16,7 +16,7 @@ from motionlab import Motion, Skeleton
 from motionlab.datasets import gaits
 from motionlab.errors import RetargetError
 from motionlab.retargeting import rest_alignment
-from motionlab.retargeting.stance import find_stance, stances
+from motionlab.retargeting.stance import Stances, find_stance, stances
 
 CANONICAL = Skeleton.canonical()
 # A second each of walking, of standing, of walking on.
@@ -93,6 +93,18 @@ def test_each_rig_gets_its_own_and_one_that_stands_needs_none():
     assert none is None and a is again and b is and_again and a is not b
     assert a.skeleton.names[0].startswith("rig1") and b.skeleton.names[0].startswith("rig2")
     assert len(found.said) == 2 and all("2 clips" in said for said in found.said)
+
+
+def test_a_rest_pose_that_stands_needs_none_wherever_it_faces():
+    quarter = torch.tensor([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    body = replace(
+        CANONICAL,
+        offsets=CANONICAL.offsets @ quarter.T,
+        end_offsets=CANONICAL.end_offsets @ quarter.T,
+    )
+    turned = quarter @ WALKS.rotations @ quarter.T
+    clip = Motion(body, WALKS.root_positions @ quarter.T, turned, WALKS.fps)
+    assert stances([clip, clip], CANONICAL) == Stances([None, None], [])
 
 
 def test_another_actor_of_the_rig_has_its_axes():

@@ -24,7 +24,7 @@ from ..errors import RetargetError
 from ..motion import Motion, concatenate
 from ..roles import SIDES
 from ..skeleton import Skeleton
-from .rest_alignment import SHORT, alignment, facing, stands
+from .rest_alignment import SHORT, alignment, facing, upright
 from .retarget import NEEDED
 
 SECONDS = 0.5  # that a person must stand
@@ -84,7 +84,7 @@ def stances(
             continue  # `retarget` says why it can't
         if given is not None and _same_rig(its, given.skeleton):
             stance = given
-        elif stands(its):
+        elif upright(its):
             continue
         else:
             stance, how = _of_rig(members, skeleton)
