@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from collections import Counter
@@ -180,6 +181,17 @@ def _confirm() -> None:
         raise MotionLabError("Nothing was downloaded; confirm with y, or pass --yes.")
 
 
+def _downward(arguments: Sequence[str]) -> list[str]:
+    """Arguments in which `--up -z` is one word: by itself, -z would be taken for an option."""
+    joined: list[str] = []
+    for word in arguments:
+        if joined and joined[-1] in ("--up", "--rig-up") and word in ("-x", "-y", "-z"):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
 @contextmanager
 def _plain_warnings() -> Iterator[None]:
     """Warnings as a line for the person who typed the command, without the line of code they came from."""
@@ -200,17 +212,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command = tyro.cli(
         OmitSubcommandPrefixes[COMMANDS],
         prog="motionlab",
-        args=arguments,
+        args=_downward(sys.argv[1:] if arguments is None else arguments),
         description="Motion data and models.",
     )
     try:
         with _plain_warnings():
             command.run()
+        sys.stdout.flush()
     except MotionLabError as error:
         print(f"motionlab: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
+    except BrokenPipeError:  # the reader of our words has enough, as `head` has
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     return 0
 
 

@@ -83,7 +83,7 @@ def test_convert_reads_as_it_is_told(here):
 
 def test_root_motion(here, capsys):
     assert main(["convert", "walk.bvh", "--out", "x.bvh", "--root-motion", "ground"]) == 0
-    assert "way and heading on a root joint" in capsys.readouterr().out
+    assert "one root joint more, for way and heading" in capsys.readouterr().out
     assert same(read_bvh("x.bvh"), WALK) and "ROOT Root" in (here / "x.bvh").read_text()
     assert main(["convert", "walk.bvh", "--out", "y.bvh", "--root-motion", "in-place"]) == 0
     assert read_bvh("y.bvh").positions()[:, 0, [0, 2]].abs().max() < 1e-4
@@ -338,3 +338,24 @@ def test_a_warning_is_a_line_of_its_own_without_code(here, monkeypatch):
     assert main(["info", "walk.bvh"]) == 0
     assert said == ["note: clips: half of them lie\n"]
     assert warnings.formatwarning is before
+
+
+@pytest.mark.parametrize("way", [["--up", "-z"], ["--up=-z"]])
+def test_an_axis_that_points_down_is_no_option(here, way, capsys):
+    assert main(["convert", "walk.bvh", *way, "--out", "x.bvh"]) == 0
+    assert "x.bvh: 30 frames" in capsys.readouterr().out
+
+
+def test_formats_that_are_known_to_be_others_are_named(here, capsys):
+    (here / "walk.fbx").write_bytes(b"Kaydara FBX Binary")
+    assert main(["info", "walk.fbx"]) == 1
+    assert "walk.fbx: .fbx files are not read, but .bvh, .amc, .glb or" in capsys.readouterr().err
+
+
+def test_a_rigs_file_in_other_axes_is_told(here, capsys):
+    write_bvh(WALK, "rig.bvh", units="m")
+    assert (
+        main(["retarget", "walk.bvh", "--onto", "rig.bvh", "--rig-units", "m", "--out", "x.bvh"])
+        == 0
+    )
+    assert "unlike the rig's file, y up and in centimetres" in capsys.readouterr().out

@@ -107,6 +107,25 @@ def test_a_rest_pose_that_stands_needs_none_wherever_it_faces():
     assert stances([clip, clip], CANONICAL) == Stances([None, None], [])
 
 
+def test_a_clip_that_lies_spoils_no_axes():
+    lying = torch.tensor([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    clip = redrawn(WALKS, 1)
+    turned = clip.rotations.clone()
+    turned[:, 0] = lying @ turned[:, 0]
+    fallen = replace(clip, rotations=turned, root_positions=clip.root_positions @ lying.T)
+    alone, beside = stances([clip], CANONICAL), stances([fallen, clip, fallen], CANONICAL)
+    rotations = [clip.retarget(reference=its).rotations for its in
+                 (alone.references[0], beside.references[1])]  # fmt: skip
+    torch.testing.assert_close(*rotations, rtol=0, atol=1e-5)
+
+
+def test_a_clip_too_small_to_be_retargeted_takes_nothing_from_its_rig():
+    clip = redrawn(WALKS, 1)
+    small = replace(clip.skeleton, offsets=clip.skeleton.offsets / 100)
+    found = stances([replace(clip, skeleton=small), clip], CANONICAL)
+    assert found.references[1] is not None
+
+
 def test_another_actor_of_the_rig_has_its_axes():
     clips = [redrawn(STANDS, 3), redrawn(WALKS, 3, 1.2)]
     one, other = stances(clips, CANONICAL).references

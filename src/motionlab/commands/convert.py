@@ -86,6 +86,12 @@ class Brought(Written, Rig):
         for said in stood.said:
             print(f"note: {self.path}: {as_options(said)}")
 
+    def _write_one(self, motion: Motion, file: Path, target: Path) -> str:
+        line = super()._write_one(motion, file, target)
+        if target.suffix.lower() == ".bvh" and (self.rig_units, self.rig_up) != (None, None):
+            line += "; unlike the rig's file, y up and in centimetres"
+        return line
+
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
         if self.onto_name() is None:
             return motion, []
@@ -142,4 +148,4 @@ def _sizes(before: Motion, after: Motion) -> str:
 def _about_root(root_motion: str | None) -> list[str]:
     if root_motion is None:
         return []
-    return ["in place" if root_motion == "in-place" else "way and heading on a root joint"]
+    return ["in place" if root_motion == "in-place" else "one root joint more, for way and heading"]

@@ -36,6 +36,7 @@ class Rig:
             return None
         how = Files(units=self.rig_units, up=self.rig_up, roles=self.rig_roles).how()
         rig, doubts = read_motion(Path(name), how)
+        doubts.pop("rate", None)  # how fast it moves is not asked
         for said in doubts.values():
             print(f"note: {name}: {_of_the_rig(said)}", flush=True)
         body = Skeleton.canonical()

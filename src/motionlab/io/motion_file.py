@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from ..errors import MotionFileError
 from ..motion import Motion
 from . import acclaim, bvh_reading, gltf_reading
 from .bvh_reading import Doubts, Reading
@@ -16,6 +17,19 @@ _READERS = {
     ".gltf": gltf_reading.read,
 }
 SUFFIXES = tuple(_READERS)
+_OTHERS = (
+    ".fbx",
+    ".c3d",
+    ".dae",
+    ".usd",
+    ".usda",
+    ".usdc",
+    ".usdz",
+    ".vmd",
+    ".trc",
+    ".npz",
+    ".blend",
+)
 ENDINGS = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"  # in words
 
 
@@ -25,7 +39,8 @@ def is_motion(path: Path) -> bool:
 
 
 def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tuple[Motion, Doubts]:
-    """The motion in a file, and what to warn of; what ends in none of `SUFFIXES` is read as BVH.
+    """The motion in a file, and what to warn of; what ends in none of `SUFFIXES` is read as BVH, but
+    for formats that are known to be other ones.
 
     Raises
     ------
@@ -34,4 +49,9 @@ def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tupl
     ending = Path(path).suffix.lower() if isinstance(path, str | os.PathLike) else ""
     if ending == ".asf":  # which is half a motion, as its reader says
         return acclaim.read(path, how, source)
+    if ending in _OTHERS:
+        raise MotionFileError(
+            f"{path}: {ending} files are not read, but {ENDINGS} are. Blender opens most others: import "
+            "it there and export glTF (.glb)."
+        )
     return _READERS.get(ending, bvh_reading.read)(path, how, source)

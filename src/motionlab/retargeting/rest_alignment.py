@@ -121,6 +121,11 @@ def upright(skeleton: Skeleton) -> bool:
     return bool(_up(points[None], skeleton, "upper_leg", "upper_arm")[0, 1] > 0.95)
 
 
+def rising(points: Tensor, skeleton: Skeleton) -> Tensor:
+    """In which frames (frames,) the trunk points up, more or less."""
+    return _up(points, skeleton, "upper_leg", "upper_arm")[:, 1] > _UPRIGHT
+
+
 def limb_length(skeleton: Skeleton, limb: str, sides: Sequence[str] = SIDES) -> float:
     """Length in metres of a limb's two long bones ("arm", "leg"), mean over sides."""
     parts = (f"upper_{limb}", f"lower_{limb}", "foot" if limb == "leg" else "hand")
@@ -198,8 +203,7 @@ def _from_stance(stance: Motion, target: Skeleton, roles: list[str]) -> dict[str
 def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str, Tensor]:
     """From whatever the person does, most of it upright."""
     source, points, orientations = motion.skeleton, motion.positions(), motion.orientations()
-    trunk = _up(points, source, "upper_leg", "upper_arm")
-    rises = trunk[:, 1] > _UPRIGHT
+    trunk, rises = _up(points, source, "upper_leg", "upper_arm"), rising(points, source)
     if rises.float().mean() >= _SHARE:
         points, orientations = points[rises], orientations[rises]
         ahead = facing(points, source)

@@ -24,7 +24,7 @@ from ..errors import RetargetError
 from ..motion import Motion, concatenate
 from ..roles import SIDES
 from ..skeleton import Skeleton
-from .rest_alignment import SHORT, alignment, facing, upright
+from .rest_alignment import SHORT, alignment, facing, rising, upright
 from .retarget import NEEDED
 
 SECONDS = 0.5  # that a person must stand
@@ -78,16 +78,16 @@ def stances(
     found: list[Motion | None] = [None] * len(motions)
     said = []
     for group in _rigs(motions):
-        members = [motions[i] for i in group]
-        its = members[0].skeleton
-        if not (_is_whole(its) and _is_whole(skeleton)):
+        whole = [motions[i] for i in group if _is_whole(motions[i].skeleton)]
+        if not whole or not _is_whole(skeleton):
             continue  # `retarget` says why it can't
+        its = whole[0].skeleton
         if given is not None and _same_rig(its, given.skeleton):
             stance = given
         elif upright(its):
             continue
         else:
-            stance, how = _of_rig(members, skeleton)
+            stance, how = _of_rig(_teachers(whole), skeleton)
             what = "1 clip" if len(group) == 1 else f"{len(group)} clips of one rig"
             said.append(
                 f"the rest pose of {what} is no standing body; how its joint axes lie is learned "
@@ -130,6 +130,15 @@ def find_stance(motions: Sequence[Motion], slack: float = 1.0) -> Motion | None:
         f"{m.name}, {first / m.fps:.1f} to {last / m.fps:.1f} s" for _, m, first, last in moments
     ]
     return replace(concatenate(parts), name="; ".join(spoken))
+
+
+def _teachers(motions: Sequence[Motion]) -> Sequence[Motion]:
+    """The clips of a rig that tell its axes. One that lies throughout, as clips do whose up was
+    mistaken, would spoil them for all others; only if all do they have to do."""
+    seen = [motion[:: max(1, len(motion) // 50)] for motion in motions]
+    share = [rising(some.positions(), some.skeleton).float().mean() for some in seen]
+    upright_ones = [motion for motion, its in zip(motions, share, strict=True) if its > 0.5]
+    return upright_ones or motions
 
 
 def _of_rig(motions: Sequence[Motion], skeleton: Skeleton) -> tuple[Motion, str]:
