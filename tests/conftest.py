@@ -7,7 +7,11 @@ import zipfile
 from collections import Counter
 from pathlib import Path
 
+import hypothesis
 import pytest
+
+hypothesis.settings.register_profile("motionlab", deadline=None)  # a busy machine is no fault
+hypothesis.settings.load_profile("motionlab")
 
 DATA = os.environ.get("MOTIONLAB_DATA")
 if DATA:  # some tests run elsewhere
