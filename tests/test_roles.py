@@ -107,6 +107,10 @@ def test_names_of_other_letters_and_endless_ones():
         ("hip thigh knee ankle", "- upper_leg lower_leg foot"),
         ("thigh shin ankle foot toe", "upper_leg lower_leg foot - toes"),
         ("leg1 leg2 foot toe", "upper_leg lower_leg foot toes"),
+        ("thigh calf b17 ball", "upper_leg lower_leg foot toes"),
+        ("thigh b17 ankle toe", "upper_leg lower_leg foot toes"),
+        ("thigh b1 b2 toe", "upper_leg - - toes"),
+        ("clavicle b1 forearm hand", "shoulder upper_arm lower_arm hand"),
         ("leg foot", "lower_leg foot"),
         ("shoulder arm forearm hand", "shoulder upper_arm lower_arm hand"),
         ("collar shoulder elbow wrist hand", "shoulder upper_arm lower_arm hand -"),
@@ -192,10 +196,10 @@ def test_what_is_said_wins_and_stays():
 
 def test_partners_are_who_is_said():
     names = list(CANONICAL.names)
-    names[15], names[19] = "Bone.L.001", "Bone.R.002"
+    names[16], names[20] = "Bone.L.001", "Bone.R.002"
     skeleton = replace(CANONICAL, names=names)
-    assert skeleton.mirror_partners[15] == 15
-    said = replace(skeleton, roles={"left_foot": names[15], "right_foot": names[19]})
+    assert skeleton.mirror_partners[16] == 16
+    said = replace(skeleton, roles={"left_toes": names[16], "right_toes": names[20]})
     assert said.mirror_partners == CANONICAL.mirror_partners
     swapped = roles.partners(
         ["LeftHand", "RightHand", "LeftGlove"], {"left_hand": 2, "right_hand": 1}
@@ -252,13 +256,13 @@ def test_joints_without_partner_are_told(gait):
     with pytest.warns(UserWarning, match="bone 6, bone 7.*roles=") as told:
         replace(gait, skeleton=without_names(gait.skeleton)).mirror()
     assert len(told) == 1
-    names = [name.replace("LeftFoot", "Paw") for name in gait.skeleton.names]
+    names = [name.replace("LeftToes", "Paw") for name in gait.skeleton.names]
     lame = rig_names.renamed(gait, names)
-    with pytest.warns(UserWarning, match="belongs to Paw, RightFoot is not known"):
+    with pytest.warns(UserWarning, match="belongs to Paw, RightToes is not known"):
         lame.mirror()
     # whichever way the body faces
     turned = replace(lame.skeleton, offsets=lame.skeleton.offsets[:, [2, 1, 0]])
-    assert turned.without_partner == lame.skeleton.without_partner == (15, 19)
+    assert turned.without_partner == lame.skeleton.without_partner == (16, 20)
 
 
 def test_a_rest_pose_along_the_bones_tells_no_middle():

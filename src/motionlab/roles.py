@@ -30,7 +30,7 @@ name that says more, as ``LeftFootIK`` or ``LeftHandThumb1``, gets no role::
 Then the tree: down a leg come upper leg, lower leg, foot and toes, down an arm shoulder, upper arm,
 lower arm and hand, and of two joints that could be either the upper one is it, or the one whose name
 has nothing left out (CMU's ``LeftHip``, which hangs on a ``LHipJoint``). Hips are where both
-legs meet, whatever they are called, the chest is where the arms branch off, the spine is the first
+legs meet, whatever they are called, one joint between shin and toes is the foot, the chest is where the arms branch off, the spine is the first
 joint from the one to the other, the neck carries the head.
 
 What is understood wrongly or not at all is said with ``roles={"left_foot": "LFoot"}``; ``motionlab
@@ -102,6 +102,12 @@ def _find(
         own = [word if s == side else "" for s, word in zip(sides, words, strict=True)]
         for parts in (ARM, LEG):
             limb = _limb(_weights(own, plain, parts, side, said), parents, parts)
+            silent = [
+                s in (None, side) and word not in LIMB_OF and word not in TRUNK_OF
+                for s, word in zip(sides, words, strict=True)
+            ]
+            free = [part for part in parts if f"{side}_{part}" not in said]
+            limb |= _between(limb, silent, parents, parts, free)
             limbs |= {f"{side}_{part}": joint for part, joint in limb.items()}
     taken = {*limbs.values(), *said.values()}
     kinds = [
@@ -239,6 +245,24 @@ def _limb(
             clear = (j for j, says in enumerate(weights) if says.get(part, 0) >= CLEAR)
             joint = next((j for j in clear if j not in found.values()), None)
             found |= {} if joint is None else {part: joint}
+    return found
+
+
+def _between(
+    limb: Mapping[str, int],
+    silent: Sequence[bool],
+    parents: Sequence[int],
+    parts: Sequence[str],
+    free: Sequence[str],
+) -> dict[str, int]:
+    """Parts that are missing between two others of a limb, where one joint alone lies between them
+    whose name is `silent` (joints,): what hangs on a shin and carries toes is a foot."""
+    found = {}
+    for above, part, below in zip(parts, parts[1:], parts[2:], strict=False):
+        if part in free and part not in limb and above in limb and below in limb:
+            joint = parents[limb[below]]
+            if joint >= 0 and silent[joint] and parents[joint] == limb[above]:
+                found[part] = joint
     return found
 
 

@@ -239,6 +239,15 @@ def test_wrong_units_are_noticed(tmp_path):
         read_bvh(tmp_path / "clip.bvh")
 
 
+def test_the_inches_of_a_tall_adult_are_noticed(tmp_path):
+    body = Skeleton.canonical()
+    tall = replace(body, offsets=body.offsets * 1.8 / 1.3446)  # metres from foot to head
+    still = Motion(tall, torch.zeros(2, 3), torch.eye(3).expand(2, 21, 3, 3), fps=30)
+    write_bvh(still, tmp_path / "clip.bvh", units="in")
+    with pytest.warns(UserWarning, match="units='in' makes it 1.80 m"):
+        read_bvh(tmp_path / "clip.bvh")
+
+
 @pytest.mark.parametrize("units, said", [("cm", []), ("m", [True]), ("mm", [True])])
 def test_wrong_units_are_noticed_where_feet_are_not_known(tmp_path, units, said):
     body = Skeleton.canonical()
