@@ -305,13 +305,14 @@ def own_weight(loaded: set[str], base: str, folder: Path) -> int:
     return sum(path.stat().st_size for path in own if path.is_file())
 
 
-def check(folder: Path) -> list[str]:
-    """All troubles of the book in this folder, one line each."""
+def check(folder: Path, served: bool = True) -> list[str]:
+    """All troubles of the book in this folder, one line each; from disk alone, or from a server, too."""
     troubles = []
     pages = sorted(p for p in folder.rglob("*.html") if "_static" not in p.parts)
     with local_server(folder) as server, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
-        for base, (width, height) in product((folder.as_uri() + "/", server), (DESKTOP, PHONE)):
+        bases = (folder.as_uri() + "/", server)[: 1 + served]
+        for base, (width, height) in product(bases, (DESKTOP, PHONE)):
             window = browser.new_context(viewport={"width": width, "height": height})
             where = f"{base.split(':')[0]}, {width} px"
             troubles += [f"{where}: search: {t}" for t in check_search(window, base)]
