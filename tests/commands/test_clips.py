@@ -73,12 +73,12 @@ def test_convert_reads_as_it_is_told(here):
     odd = any_rig.drawn(WALK, axes)  # z up, also in the rest pose
     turned = torch.cat([axes[:1] .mT @ odd.rotations[:, :1], odd.rotations[:, 1:]], 1)  # fmt: skip
     odd = replace(odd, root_positions=WALK.root_positions @ axes[0], rotations=turned)
-    names = [name.replace("LeftFoot", "Paw") for name in odd.skeleton.names]
+    names = [name.replace("LeftHand", "Paw") for name in odd.skeleton.names]
     write_bvh(replace(odd, skeleton=replace(odd.skeleton, names=names)), "odd.bvh", units="in")
-    (here / "rig.toml").write_text('left_foot = "Paw"\n')
+    (here / "rig.toml").write_text('left_hand = "Paw"\n')
     command = ["convert", "odd.bvh", "--out", "x.bvh", "--up", "z", "--units", "in"]
     assert main([*command, "--roles", "rig.toml"]) == 0
-    assert same(read_bvh("x.bvh", roles={"left_foot": "Paw"}), WALK)
+    assert same(read_bvh("x.bvh", roles={"left_hand": "Paw"}), WALK)
 
 
 def test_root_motion(here, capsys):

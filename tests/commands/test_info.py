@@ -18,7 +18,8 @@ from motionlab.errors import BvhError
 def walk(tmp_path):
     """A clip whose left ankle and hand are called as nobody calls them."""
     motion = gaits.make(seconds=1, name="walk")
-    names = [{"LeftFoot": 'Paw "1"', "LeftHand": "Claw"}.get(n, n) for n in motion.skeleton.names]
+    odd = {"LeftLowerLeg": "Rod", "LeftFoot": 'Paw "1"', "LeftHand": "Claw"}
+    names = [odd.get(name, name) for name in motion.skeleton.names]
     path = tmp_path / "walk.bvh"
     write_bvh(rig_names.renamed(motion, names), path)
     return path
@@ -29,16 +30,18 @@ def test_what_it_says_of_a_file(walk):
     assert text.startswith(
         "# walk: 21 joints, 30 frames, 1.00 s, 30 fps, 1.34 m from foot to head\n"
     )
-    assert 'left_lower_leg = "LeftLowerLeg"\n# ROLE = "Paw_\\"1\\""\nleft_toes = ' in text
+    assert '# ROLE = "Rod"\n# ROLE = "Paw_\\"1\\""\nleft_toes = ' in text
     needs = text[text.index("needs also") :]
-    assert '# left_hand = "NAME"\n# left_foot = "NAME"\n' in needs and "right_hand" not in needs
+    wanted = [f'# left_{part} = "NAME"\n' for part in ("hand", "lower_leg", "foot")]
+    assert "".join(wanted) in needs and "right_hand" not in needs
     # the hands keep their side in the mirror, which makes a body of it that is none
-    assert 'without a partner on the other: "Claw", "RightHand", "Paw_' in text
+    assert 'without a partner on the other: "Claw", "RightHand", "Rod", "Paw_' in text
 
 
 def test_it_can_be_mended_and_given_back(walk, tmp_path, capsys):
     table = tmp_path / "rig.toml"
     text = describe(walk).replace('# left_hand = "NAME"', 'left_hand = "Claw"')
+    text = text.replace('# ROLE = "Rod', 'left_lower_leg = "Rod')
     text = text.replace('# ROLE = "Paw', 'left_foot = "Paw').replace("left_toes", "# left_toes")
     table.write_text(text + '\nleft_toes = ""\n', encoding="utf-8")
     given = roles.read(table)
@@ -77,7 +80,9 @@ def test_a_folder_has_a_line_for_each_file(walk, tmp_path, capsys):
     assert right.endswith(
         ": 21 joints, 30 frames, 1.00 s, 30 fps, 1.34 m from foot to head; has all roles that retargeting needs"
     )
-    assert lacking.startswith("walk.bvh: ") and lacking.endswith("; lacks left_hand, left_foot")
+    assert lacking.startswith("walk.bvh: ") and lacking.endswith(
+        "; lacks left_hand, left_lower_leg, left_foot"
+    )
     assert main(["info", str(tmp_path), "--units", "0.01"]) == 0
     assert capsys.readouterr().out.splitlines()[2] == right
 
