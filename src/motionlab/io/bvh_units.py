@@ -10,8 +10,8 @@ from ..skeleton import Skeleton
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 # Metres along the bones from ankle to head joint. The bodies of our data sets measure 1.34 to 1.80,
-# a child of two years 0.7. Adults in inches that are read as centimetres measure 0.53 to 0.71.
-HEIGHTS = (0.75, 2.2)
+# a small child 0.72. Adults in inches that are read as centimetres measure 0.53 to 0.71.
+HEIGHTS = (0.715, 2.2)
 _USUAL = 1.5
 # The same between the two joints that are farthest from each other, such as hand and foot of a
 # person. Wide: it may be an arm alone, or half a horse.
