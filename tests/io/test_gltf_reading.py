@@ -171,8 +171,7 @@ def test_any_nodes_are_where_their_matrices_say(tmp_path_factory, tree, fps):
     keys = [times for (node, _), (times, _, _) in moves.items() if node in about]
     keys = np.concatenate(keys or [np.zeros(1)])
     times = np.float32(keys.min()) + np.arange(len(read)) / fps
-    late = 0.05 / fps + 1e-3  # that a last frame may be: then the last key holds
-    assert keys.max() - 1 / fps - 1e-3 < times[-1] < keys.max() + late
+    assert keys.max() - 1 / fps - 1e-3 < times[-1] < keys.max() + 1e-3
     expected = worlds(gltf, times.clip(max=np.float32(keys.max())), 0 if moves else None)
     assert set(joints) <= {names.index(name) for name in read.skeleton.names}
     for joint, name in enumerate(read.skeleton.names):

@@ -151,7 +151,7 @@ def frames(
             f"its animation lasts {span:.4g} s, which is too long at {fps:g} frames per second",
             "pass fewer as fps=, or export it again if it does not last that long",
         )
-    count = int(span * fps + _COARSE) + 1
+    count = int((span + near) * fps) + 1  # none is later than the last key
     when = keys[0] + np.arange(count) / fps
     nearest = keys[np.searchsorted((keys[1:] + keys[:-1]) / 2, when)]
     return np.where(np.abs(nearest - when) < near, nearest, when), float(fps), doubt
