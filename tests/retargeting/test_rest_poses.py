@@ -10,6 +10,7 @@ import roma
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from other_axes import in_axes
 
 from motionlab import Motion, Skeleton
 from motionlab.datasets import gaits
@@ -26,13 +27,7 @@ def redrawn(motion: Motion, turn: torch.Tensor, prefix: str = "x") -> Motion:
     turn : (joints, 3, 3), each joint's new axes in its old ones; offsets say how the rest pose lies.
     """
     s = motion.skeleton
-    offsets, ends, rotations = s.offsets.clone(), s.end_offsets.clone(), motion.rotations @ turn
-    for joint, parent in enumerate(s.parents):
-        if parent >= 0:
-            offsets[joint] = turn[parent].mT @ offsets[joint]
-            rotations[:, joint] = turn[parent].mT @ rotations[:, joint]
-    for end, parent in enumerate(s.end_parents):
-        ends[end] = turn[parent].mT @ ends[end]
+    offsets, ends, rotations = in_axes(motion, turn)
     names = [f"{prefix}{joint}" for joint in range(s.joints)]
     roles = {role: names[joint] for role, joint in s.roles.items()}
     body = Skeleton(names, s.parents, offsets, s.end_parents, ends, roles=roles)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 import roma
 import torch
+from other_axes import in_axes
 
 from motionlab import Motion, Skeleton, datasets
 from motionlab.datasets import gaits, loader, locomotion
@@ -32,13 +33,7 @@ def renamed(motion: Motion, factor: float = 1.0, turn: torch.Tensor | None = Non
     """
     s = motion.skeleton
     turn = torch.eye(3).expand(s.joints, 3, 3) if turn is None else turn
-    offsets, ends, rotations = s.offsets.clone(), s.end_offsets.clone(), motion.rotations @ turn
-    for joint, parent in enumerate(s.parents):
-        if parent >= 0:
-            offsets[joint] = turn[parent].mT @ offsets[joint]
-            rotations[:, joint] = turn[parent].mT @ rotations[:, joint]
-    for end, parent in enumerate(s.end_parents):
-        ends[end] = turn[parent].mT @ ends[end]
+    offsets, ends, rotations = in_axes(motion, turn)
     names = tuple(name.replace("Hips", "pelvis") for name in s.names)
     body = Skeleton(names, s.parents, factor * offsets, s.end_parents, factor * ends)
     return replace(
