@@ -172,6 +172,9 @@ def test_any_nodes_are_where_their_matrices_say(tmp_path_factory, tree, fps):
     keys = np.concatenate(keys or [np.zeros(1)])
     times = np.float32(keys.min()) + np.arange(len(read)) / fps
     assert keys.max() - 1 / fps - 1e-3 < times[-1] < keys.max() + 1e-3
+    # a frame that float32 sets beside a key is at the key: of a STEP that is another value
+    nearest = keys.astype(np.float32)[np.abs(times[:, None] - keys).argmin(axis=1)]
+    times = np.where(np.abs(nearest - times) < 1e-6, nearest, times)
     expected = worlds(gltf, times.clip(max=np.float32(keys.max())), 0 if moves else None)
     assert set(joints) <= {names.index(name) for name in read.skeleton.names}
     for joint, name in enumerate(read.skeleton.names):
@@ -179,6 +182,17 @@ def test_any_nodes_are_where_their_matrices_say(tmp_path_factory, tree, fps):
         np.testing.assert_allclose(read.positions()[:, joint], at[:, :3, 3], atol=1e-3)
         turns = at[:, :3, :3] / np.cbrt(np.linalg.det(at[:, :3, :3]))[:, None, None]
         np.testing.assert_allclose(read.orientations()[:, joint], turns, atol=1e-3)
+
+
+def test_a_step_is_taken_in_the_frame_at_which_it_is_written(tmp_path):
+    turns = Rotation.from_euler("y", [[0], [60], [120]], degrees=True).as_quat()
+    gltf = Gltf([{"name": "n0", "children": [1]}, {"name": "n1", "translation": [0, 1, 0]}])
+    skin(gltf, [0, 1], np.tile(np.eye(4), (2, 1, 1)))
+    # 0.11 s + 33 frames is 1.21 s, but not in float32
+    gltf.animate({(0, "rotation"): (np.array([0.11, 1.21, 1.37]), turns, "STEP")})
+    read = read_gltf(gltf.save(tmp_path / "step.glb"), fps=30)
+    facing = Rotation.from_matrix(read.orientations()[:, 0].numpy()).as_euler("YXZ")[:, 0]
+    np.testing.assert_allclose(np.degrees(facing), [0] * 33 + [60] * 5, atol=1e-3)
 
 
 # -- options --------------------------------------------------------------------------------------
