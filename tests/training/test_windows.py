@@ -45,6 +45,22 @@ def test_draws_are_even():
     assert counts[counts > 0].tolist() == pytest.approx([1000] * 8, abs=150)
 
 
+def test_some_clips_are_drawn_more_often():
+    clips = numbered([5, 9, 30])  # 2, 6 and 27 windows
+    windows = Windows(clips, 4, often=[True, False, False], share=0.25)
+    generator = torch.Generator().manual_seed(0)
+    for _ in range(20):
+        assert int((windows.draw(8, generator)[:, 0, 0] == 0).sum()) == 2
+    drawn = windows.draw(8000, generator)
+    counts = torch.bincount(drawn[:, 0, 0].long())
+    assert counts.tolist() == pytest.approx([2000, 6000 * 6 / 33, 6000 * 27 / 33], abs=150)
+    for often in (None, [False] * 3):  # the same chance, the same windows
+        plain = Windows(clips, 4, often, share=0.25).draw(8, torch.Generator().manual_seed(1))
+        assert plain.equal(Windows(clips, 4).draw(8, torch.Generator().manual_seed(1)))
+    alone = Windows(clips, 4, [True] * 3, share=0.25)
+    assert len(alone.draw(8, generator)) == 8
+
+
 def test_no_clips():
     with pytest.raises(TrainingError, match="All 0 clips"):
         Windows([], 8)

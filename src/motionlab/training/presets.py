@@ -13,6 +13,7 @@ from ..errors import TrainingError
 from ..models import LstmGmm, Refiner
 from .checkpoints import load_weights
 from .prepared import Prepared
+from .run_on import run_on
 from .windows import Windows
 
 Optimizer = Literal["adam", "rmsprop", "sgd"]
@@ -115,6 +116,11 @@ class MixturePreset(Preset):
     """Gaussians in the mixture."""
     skip: float = 0.9
     """Share of the present frame that goes straight into the means; the paper's is 0."""
+    run_on: int = 0
+    """Frames to which training clips that end in a run are brought by repeating their last strides
+    (see `run_on.py`); 0: they end where the recording does."""
+    runs: float = 0.0
+    """Share of a batch's windows that are of clips that end in a run; 0: as many as there are."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -122,6 +128,18 @@ class MixturePreset(Preset):
             raise TrainingError(f"components must be 1 or more: {self}.")
         if not 0 <= self.skip <= 1:
             raise TrainingError(f"skip is {self.skip}; it must lie between 0 and 1.")
+        if self.run_on < 0 or not 0 <= self.runs < 1:
+            raise TrainingError(
+                f"run_on is {self.run_on}, runs {self.runs}; run_on must be 0 or more frames, and "
+                "runs a share from 0 to below 1."
+            )
+
+    def windows(self, data: Prepared, split: str) -> Windows:
+        """Windows of a split; in training, with runs that go on."""
+        clips, runs = data.clips(split), None
+        if split == "train" and (self.run_on or self.runs):
+            clips, runs = run_on(clips, data.encoding, data.normalizer, self.run_on)
+        return Windows(clips, self.frames, runs if self.runs else None, self.runs)
 
     def model(self, data: Prepared) -> LstmGmm:
         """An untrained network for some data."""

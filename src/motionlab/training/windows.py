@@ -17,13 +17,21 @@ class Windows:
     ----------
     clips : list of (frames, dim).
     frames : length of a window.
+    often : which clips are drawn more often than their length asks for; None: none is.
+    share : of the windows that are drawn, those of these clips.
 
     Raises
     ------
     TrainingError : no clip is long enough.
     """
 
-    def __init__(self, clips: Sequence[Tensor], frames: int) -> None:
+    def __init__(
+        self,
+        clips: Sequence[Tensor],
+        frames: int,
+        often: Sequence[bool] | None = None,
+        share: float = 0.0,
+    ) -> None:
         lengths = [len(clip) for clip in clips]
         if max(lengths, default=0) < frames:
             raise TrainingError(
@@ -33,17 +41,26 @@ class Windows:
         self.rows = torch.cat(list(clips))  # (all rows, dim)
         ends = torch.tensor(lengths).cumsum(0).tolist()
         spans = [range(end - n, end - frames + 1) for end, n in zip(ends, lengths, strict=True)]
-        self._starts = torch.tensor([start for span in spans for start in span])
+        starts = torch.tensor([start for span in spans for start in span])
+        which = [bool(often and often[i]) for i, span in enumerate(spans) for _ in span]
+        which = torch.tensor(which, dtype=torch.bool)
+        self._often, self._share = starts[which], share if not which.all() else 1.0
+        self._other = starts[~which]
         # one after the other, the last one moved back so that it ends with the clip
         tiles = [start for span in spans if span for start in {*span[::frames], span[-1]}]
         self._tiles = torch.tensor(sorted(tiles))
         self._within = torch.arange(frames)
 
     def draw(self, count: int, generator: torch.Generator) -> Tensor:
-        """Windows (count, frames, dim), each as likely as any other."""
-        return self._cut(
-            self._starts[torch.randint(len(self._starts), (count,), generator=generator)]
-        )
+        """Windows (count, frames, dim), each as likely as any other of its kind."""
+        many = round(self._share * count) if len(self._often) else 0
+        kinds = [(self._often, many), (self._other, count - many)]
+        drawn = [
+            starts[torch.randint(len(starts), (some,), generator=generator)]
+            for starts, some in kinds
+            if some
+        ]
+        return self._cut(torch.cat(drawn))
 
     def tiles(self, batch: int) -> list[Tensor]:
         """Windows (at most batch, frames, dim) that together cover every clip."""
