@@ -9,6 +9,7 @@ is hidden in the model.
 from .aclstm import AcLstm, auto_condition
 from .erd import Erd
 from .lstm_gmm import LstmGmm, Mixture
+from .noise import next_noise
 from .refiner import Discriminator, Refiner
 from .seq2seq import Seq2Seq
 from .state import State
@@ -23,4 +24,5 @@ __all__ = [
     "Seq2Seq",
     "State",
     "auto_condition",
+    "next_noise",
 ]

@@ -15,7 +15,8 @@ from torch import Tensor, nn
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
 from .next_frame import NextFrame
-from .sampler import PRECISIONS, can_round, normal
+from .noise import normal
+from .sampler import PRECISIONS, can_round
 from .state import State
 from .unrolled import unroll
 

@@ -30,9 +30,20 @@ def check_normalizer(encoding: Encoding, normalizer: Normalizer) -> None:
         )
 
 
+def as_features(model: _Model, features: Tensor) -> Tensor:
+    """Features, or an array of them, as a tensor; raises ModelError for what is none."""
+    try:
+        return torch.as_tensor(features)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ModelError(
+            f"Features must be an array of numbers, not {type(features).__name__}; of a motion at "
+            f"{model.encoding.fps:g} frames a second the model's `encoding.encode` makes some."
+        ) from error
+
+
 def checked_features(model: _Model, features: Tensor) -> Tensor:
     """Features (batch, frames, dim) on the model's device, in its precision; raises ModelError."""
-    features = torch.as_tensor(features).to(model.normalizer.mean)
+    features = as_features(model, features).to(model.normalizer.mean)
     shape, dim = tuple(features.shape), model.encoding.dim
     if len(shape) != 3 or shape[-1] != dim or 0 in shape:
         raise ModelError(
@@ -59,12 +70,31 @@ def checked_state(model: _Model, state: State, what: str = "state") -> State:
 
     It must have the shapes of the model's `zero_state`. Raises ModelError, calling it `what`.
     """
-    shapes = [part.shape[1:] for part in model.zero_state()]
-    if not isinstance(state, State) or [part.shape[1:] for part in state] != shapes:
+    parts = lambda some: [part.shape[1:] for part in (some.frame, some.hidden, some.cell)]
+    if not isinstance(state, State) or parts(state) != parts(model.zero_state()):
         raise ModelError(f"{what} is no state of this model; `observe` gives one.")
+    size = len(state.frame), len(model.normalizer.kept)
+    for name in ("noise", "seen"):
+        part = getattr(state, name)
+        if part.shape[-1] == 0:
+            state = state._replace(**{name: state.frame[:, :0]})
+        elif part.shape != size:
+            raise ModelError(
+                f"{what} holds `{name}` of shape {tuple(part.shape)}, this model's is {size}. "
+                "State(state.frame, state.hidden, state.cell) is one without."
+            )
     if not all(part.isfinite().all() for part in state):
         raise ModelError(f"{what} holds a NaN or infinite value.")
     return State(*(part.to(model.normalizer.mean) for part in state))
+
+
+def check_memory(memory: float) -> None:
+    """Raise ModelError if noise can't remember so much."""
+    if not isinstance(memory, Real) or not 0 <= memory < 1:
+        raise ModelError(
+            f"generate: memory is {memory!r}; it must be a number from 0, white noise, to less "
+            "than 1, such as 0.9."
+        )
 
 
 def check_noise(noise: float) -> None:

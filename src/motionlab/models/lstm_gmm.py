@@ -15,9 +15,10 @@ from torch import Tensor, nn
 
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
-from .checks import check_noise, checked_features, checked_start
+from .checks import check_memory, check_noise, checked_features, checked_start
+from .noise import noise_to_draw, normal
 from .recurrent import Recurrent
-from .sampler import PRECISIONS, choose, normal, unroll
+from .sampler import PRECISIONS, Chance, choose, unroll
 from .state import State
 
 # Smallest standard deviations, in normalised units. A contact is 0 or 1: a Gaussian around such a
@@ -57,11 +58,16 @@ class Mixture(NamedTuple):
         component_temperature : divides the logarithms of the weights; towards 0 the likeliest
             component always wins.
         """
+        mean, std = self.choose(generator, component_temperature)
+        return mean + temperature * std * normal(std, generator)
+
+    def choose(
+        self, generator: torch.Generator | None = None, component_temperature: float = 1.0
+    ) -> tuple[Tensor, Tensor]:
+        """Mean and deviations (..., kept) of a component; arguments as of `sample`."""
         chosen = choose(self.log_weights / component_temperature, generator)  # (...)
         chosen = chosen[..., None, None].expand(*chosen.shape, 1, self.means.shape[-1])
-        mean = self.means.gather(-2, chosen)[..., 0, :]
-        std = self.stds.gather(-2, chosen)[..., 0, :]
-        return mean + temperature * std * normal(std, generator)
+        return self.means.gather(-2, chosen)[..., 0, :], self.stds.gather(-2, chosen)[..., 0, :]
 
 
 class LstmGmm(Recurrent):
@@ -128,7 +134,13 @@ class LstmGmm(Recurrent):
         return self._run(features, self.zero_state(len(features)), noise)[0]
 
     def log_prob(self, features: Tensor, noise: Tensor | None = None) -> Tensor:
-        """Log-likelihood (batch, frames - 1) of each frame but the first, given those before it."""
+        """Log-likelihood (batch, frames - 1) of each frame but the first, given those before it.
+
+        That is the density of the model's own distribution: of what `generate` draws at temperatures
+        of 1, with neither noise on the inputs nor a memory of the noise. Motion that was drawn in
+        another way has a likelihood here as recorded motion has: how well the model would have
+        foretold it. It is not the density that it was drawn from; see `generate`.
+        """
         features = checked_features(self, features)
         if features.shape[1] < 2:
             raise ModelError("log_prob needs at least 2 frames: the first one is given.")
@@ -148,7 +160,7 @@ class LstmGmm(Recurrent):
             state.cell.transpose(0, 1).contiguous(),
         )
         outputs, (hidden, cell) = self.lstm(self.enter(inputs), memory)  # (batch, frames, width)
-        after = State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1))
+        after = State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1), state.noise)
         return self._mixture(outputs, inputs), after
 
     def _mixture(self, outputs: Tensor, inputs: Tensor) -> Mixture:
@@ -188,6 +200,7 @@ class LstmGmm(Recurrent):
         temperature: float = 1.0,
         component_temperature: float = 1.0,
         noise: float = 0.0,
+        memory: float = 0.0,
         precision: str = "full",
     ) -> Tensor:
         """Motion that goes on from a state: n frames (batch, n, dim), each fed back to get the next.
@@ -195,16 +208,33 @@ class LstmGmm(Recurrent):
         Differentiable, and so it remembers every step. In ``torch.no_grad()`` it is faster (see
         sampler.py) and draws the same motion. A character that leaves all bounds ends in NaN.
 
+        **A tremble or a whim.** A frame is drawn as z = μ + T σ ε from the Gaussian of one component.
+        The paper's ε is white, new in each frame: all the chance there is goes into trembling. With a
+        `memory` ρ it is ε_t = ρ ε_{t-1} + √(1 - ρ²) n_t, with white n_t: as large at any one moment,
+        but slow, so that it adds up to a step, a turn, a change of pace. Two things stay white. The
+        choice of the component: which way to go on is a question with M answers, asked anew each
+        frame with the weights that were learned, and ε goes over from one component to the next. And
+        the noise on the inputs, which stands for errors that the network was taught to mend.
+
+        Such motion is no sample of the model's own distribution. By itself each ε_t is standard
+        normal, but given the frames before it is not: they tell ε_{t-1}, so the next frame lies
+        around μ + ρ T σ ε_{t-1}, with deviations of √(1 - ρ²) T σ. And what the network has seen
+        depends on the noise there was, so that over all motions, too, a frame and its memory go
+        together otherwise than under the model. `log_prob` of it is therefore not the density that
+        it was drawn from (nor is it at another temperature than 1).
+
         Parameters
         ----------
         n : frames.
         start : from `observe`; the batch is as large as it. Brought to the model's device and
-            precision.
+            precision. If it holds noise, as those from `go_on` do, a memory goes on from that; if
+            not, as those of observed frames and of shipped weights, from a fresh standard normal.
         generator : source of chance, on the model's device.
         temperature : factor on the standard deviations; 1 is what was learned, less is calmer.
         component_temperature : the same for the choice among the M components.
         noise : standard deviation of what is added to the network's inputs, in normalised units
             (the d of section 5.1; 0.05 in training).
+        memory : ρ of the Gaussians' noise, from 0, the paper's white noise, to less than 1.
         precision : of the weights. "full" is theirs. "int8" draws faster, one character or
             hundreds: nearly the same distribution, another motion (it rounds what is multiplied,
             too). "half" draws one or a few faster, and of weights that were stored in half
@@ -213,45 +243,60 @@ class LstmGmm(Recurrent):
         Raises
         ------
         ModelError : n is not a whole number above zero, a temperature is not above zero, the noise
-            is negative, the state is another model's or holds a NaN, the generator is on another
-            device, or the precision is none of the three or not possible here.
+            is negative, the memory is not from 0 to less than 1, the state is another model's or
+            holds a NaN, the generator is on another device, or the precision is none of the three
+            or not possible here.
         """
+        chance = Chance(generator, temperature, component_temperature, noise, memory)
+        return self._drawn(n, start, chance, precision, onward=False)[0]
+
+    def go_on(
+        self, n: int, state: State, *, precision: str = "full", **chance: float
+    ) -> tuple[Tensor, State]:
+        """`generate`, and the state (batch) after the last frame, for motion that is made in pieces.
+
+        Pieces of any length are what is generated at once, exactly, if the generator goes on as well.
+        The state takes along the noise of the last frame, whatever the memory was. So from one piece
+        to the next `memory` may change, like everything else in `chance`: arguments of `generate`.
+        Raises what that raises. Leave out characters that ended in NaN: ``state[alive]``.
+        """
+        return self._drawn(n, state, Chance(**chance), precision, onward=True)
+
+    def _drawn(
+        self, n: int, start: State, chance: Chance, precision: str, onward: bool
+    ) -> tuple[Tensor, State]:
+        """Frames, and the state after them if it is to go `onward`; checks all that it is given."""
         start = checked_start(self, n, start)
-        for what, value in [("temperature", temperature), ("component_temperature",
-                            component_temperature)]:  # fmt: skip
+        for what in ("temperature", "component_temperature"):
+            value = getattr(chance, what)
             if not isinstance(value, Real) or not 0 < value < math.inf:
                 raise ModelError(f"generate: {what} is {value!r}; it must be a number above 0.")
-        check_noise(noise)
+        check_noise(chance.noise)
+        check_memory(chance.memory)
         if precision not in PRECISIONS:
             raise ModelError(f"generate: precision {precision!r}; it is one of {[*PRECISIONS]}.")
-        like = self.normalizer.mean
+        like, generator = self.normalizer.mean, chance.generator
         if generator is not None and generator.device.type != like.device.type:
             raise ModelError(
                 f"generate: the generator is on {generator.device.type}, the model on "
                 f"{like.device.type}; use torch.Generator({like.device.type!r})."
             )
-        chance = generator, temperature, component_temperature
         if not torch.is_grad_enabled():
-            return unroll(self, n, start, *chance, noise, precision)
+            return unroll(self, n, start, chance, precision, onward)
         if precision != "full":
             raise ModelError("generate: rounded weights have no gradient; use torch.no_grad().")
-        return self._generate(n, start, *chance, noise)
+        return self._loop(n, start, chance, onward)
 
-    def _generate(
-        self,
-        n: int,
-        start: State,
-        generator: torch.Generator | None,
-        temperature: float,
-        component_temperature: float,
-        noise: float,
-    ) -> Tensor:
-        """`generate`, for reading and for gradients."""
+    def _loop(self, n: int, start: State, chance: Chance, onward: bool) -> tuple[Tensor, State]:
+        """The same, for reading and for gradients."""
+        generator, temperature, component_temperature, disturbed, memory = chance
         mixture, state, frames = self.predict(start), start, []
-        for _ in range(n):
-            if frames:
-                disturbance = noise * normal(frames[-1], generator) if noise else None
-                mixture, state = self.step(frames[-1], state, disturbance)
-            normalized = mixture.sample(generator, temperature, component_temperature)
-            frames.append(self.normalizer.inverse(normalized))
-        return torch.stack(frames, dim=1)
+        for t in range(n):
+            mean, std = mixture.choose(generator, component_temperature)
+            noise = noise_to_draw(state.noise, std, memory, generator)
+            frame = self.normalizer.inverse(mean + temperature * std * noise)
+            frames.append(frame)
+            if t < n - 1 or onward:
+                disturbance = disturbed * normal(frame, generator) if disturbed else None
+                mixture, state = self.step(frame, state._replace(noise=noise), disturbance)
+        return torch.stack(frames, dim=1), state

@@ -8,8 +8,8 @@ from torch import Tensor
 from ..errors import ModelError
 from .checks import check_noise, checked_features, checked_start
 from .fed_back import checked_real
+from .noise import normal
 from .recurrent import Recurrent
-from .sampler import normal
 from .state import State
 
 

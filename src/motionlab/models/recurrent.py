@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Self
 
-import torch
 from torch import Tensor, nn
 
 from .. import encodings
 from ..encodings import Encoding, Normalizer
-from .checks import check_normalizer, checked_features
+from .checks import as_features, check_normalizer, checked_features
 from .state import State
 
 
@@ -43,7 +42,7 @@ class Recurrent(nn.Module):
 
     def observe(self, features: Tensor) -> State:
         """The state after features (batch, frames, dim), or (frames, dim) for a batch of one."""
-        features = torch.as_tensor(features)
+        features = as_features(self, features)
         return self._seen(
             checked_features(self, features[None] if features.ndim == 2 else features)
         )

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
 import torch
@@ -21,15 +21,26 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..errors import ModelError
+from .noise import noise_to_draw, normal
+from .state import State
 
 if TYPE_CHECKING:
     from .lstm_gmm import LstmGmm
-    from .state import State
 
 _rounded: WeakKeyDictionary[LstmGmm, tuple[list, list]] = WeakKeyDictionary()
 BLOCK = 32  # numbers that a product of whole weights takes at a time
 FEW = 4  # characters for whom reading the weights takes longer than multiplying
 Linear = Callable[[Tensor], Tensor]  # (batch, in) -> (batch, out)
+
+
+class Chance(NamedTuple):
+    """How frames are drawn; see `LstmGmm.generate`."""
+
+    generator: torch.Generator | None = None
+    temperature: float = 1.0
+    component_temperature: float = 1.0
+    noise: float = 0.0
+    memory: float = 0.0
 
 
 def choose(log_weights: Tensor, generator: torch.Generator | None) -> Tensor:
@@ -43,51 +54,68 @@ def choose(log_weights: Tensor, generator: torch.Generator | None) -> Tensor:
     return (weights / waiting).argmax(-1)
 
 
-def normal(like: Tensor, generator: torch.Generator | None) -> Tensor:
-    """Standard normal numbers, as many as `like` has."""
-    return torch.randn(like.shape, generator=generator, device=like.device, dtype=like.dtype)
-
-
 @torch.no_grad()
 def unroll(
-    model: LstmGmm,
-    n: int,
-    start: State,
-    generator: torch.Generator | None,
-    temperature: float,
-    component_temperature: float,
-    noise: float,
-    precision: str,
-) -> Tensor:
-    """n frames (batch, n, dim) that go on from a state; see `LstmGmm.generate`."""
+    model: LstmGmm, n: int, start: State, chance: Chance, precision: str, onward: bool
+) -> tuple[Tensor, State]:
+    """n frames (batch, n, dim) that go on from a state; see `LstmGmm.generate`.
+
+    The state is that after the last of them if it is to go `onward`, or else the start.
+    """
     if precision != "full" and not can_round(start.hidden):
         raise ModelError(
             f'generate: precision "{precision}" needs a float32 model on an x86 processor. '
             "Leave it out."
         )
+    generator, temperature, component_temperature, disturbed, memory = chance
     with torch.autocast(start.frame.device.type, enabled=False):
-        first, second, *layers, leave = _products(model, precision)
-        seen = model.normalizer(start.frame)  # (batch, kept)
+        *enter, leave = _products(model, precision)
+        seen, noise = _seen(model, start), start.noise  # (batch, kept)
         hidden, cell = ([*part.unbind(1)] for part in (start.hidden, start.cell))
         frames = seen.new_empty(len(seen), n, model.kept)
         rows = torch.arange(len(seen), device=seen.device)
         for t in range(n):
-            if t:
-                out = second(first(seen).relu_()).relu_()
-                for i, gates in enumerate(layers):
-                    out, cell[i] = _lstm(gates(torch.cat([out, hidden[i]], 1)), cell[i])
-                    hidden[i] = out
             weights, gaussians = leave(hidden[-1]).tensor_split([model.components], 1)
             chosen = choose(weights / component_temperature, generator)
             gaussians = gaussians.view(len(seen), 2, model.components, model.kept)
             mean, log_std = gaussians[rows, :, chosen].unbind(1)
             std = temperature * (model.reach * log_std.exp() + model.floor)
-            frame = model.reach * mean + model.skip * seen + std * normal(std, generator)
-            frames[:, t] = seen = frame
-            if noise and t < n - 1:
-                disturbance = noise * normal(start.frame, generator)  # (batch, dim), as the loop's
-                seen = frame + disturbance[:, model.normalizer.kept]
-        return model.normalizer.inverse(frames)
+            noise = noise_to_draw(noise, std, memory, generator)
+            frames[:, t] = seen = model.reach * mean + model.skip * seen + std * noise
+            if t == n - 1 and not onward:
+                return model.normalizer.inverse(frames), start
+            if disturbed:
+                disturbance = disturbed * normal(
+                    start.frame, generator
+                )  # (batch, dim), as the loop's
+                seen = seen + disturbance[:, model.normalizer.kept]
+            _see(enter, seen, hidden, cell)
+        after = (torch.stack(part, 1) for part in (hidden, cell))
+        return model.normalizer.inverse(frames), State(
+            model.normalizer.inverse(seen), *after, noise, seen
+        )
+
+
+def _seen(model: LstmGmm, state: State) -> Tensor:
+    """The frame (batch, kept) of a state, normalised.
+
+    Raw units lose the last digit of what was drawn in normalised ones, and a motion that goes on
+    from there becomes another one. So the state brings it along; it counts where it is the frame.
+    """
+    seen = model.normalizer(state.frame)
+    if not state.seen.shape[-1]:
+        return seen
+    same = (model.normalizer.inverse(state.seen) == state.frame).all(-1, keepdim=True)
+    return torch.where(same, state.seen, seen)
+
+
+def _see(enter: list[Linear], seen: Tensor, hidden: list[Tensor], cell: list[Tensor]) -> None:
+    """A frame more (batch, kept): h and C of the layers become those after it."""
+    first, second, *layers = enter
+    out = second(first(seen).relu_()).relu_()
+    for i, gates in enumerate(layers):
+        out, cell[i] = _lstm(gates(torch.cat([out, hidden[i]], 1)), cell[i])
+        hidden[i] = out
 
 
 def _lstm(gates: Tensor, cell: Tensor) -> tuple[Tensor, Tensor]:

@@ -69,7 +69,8 @@ def save_weights(
     if half:
         tensors |= {name: tensor.half() for name, tensor in model.named_parameters()}
     if starts is not None:
-        tensors |= {f"{_STARTS}{key}": part.clone() for key, part in starts._asdict().items()}
+        parts = {key: part for key, part in starts._asdict().items() if part.numel()}
+        tensors |= {f"{_STARTS}{key}": part.clone() for key, part in parts.items()}
     _save(path, tensors, header)
 
 
@@ -89,7 +90,9 @@ def load_weights(path: str | os.PathLike) -> tuple[nn.Module, dict]:
         with torch.random.fork_rng(devices=[]):  # building a model draws its first weights
             model = _KINDS[header["kind"]].from_config(header["config"])
         model.load_state_dict(tensors)
-        model.starts = model.zero_state()._replace(**starts) if starts else None
+        model.starts = None
+        if starts:
+            model.starts = model.zero_state(len(starts["frame"]))._replace(**starts)
         return model, header["about"]
     except (KeyError, TypeError, ValueError, RuntimeError, MotionLabError) as error:
         raise TrainingError(
