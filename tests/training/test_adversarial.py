@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import copy
+import json
 from dataclasses import replace
 
 import pytest
 import torch
+from safetensors.torch import save_file
 
 from motionlab.errors import DivergedError, TrainingError
 from motionlab.training import adversarial, build
 from motionlab.training.adversarial import new_game, play, sample_motions, train_game
-from motionlab.training.checkpoints import load_weights
+from motionlab.training.checkpoints import load_weights, read_checkpoint
 from motionlab.training.games import GamePreset
 from motionlab.training.windows import Windows
 
@@ -214,11 +216,43 @@ def test_exploded_motions_are_drawn_again(gaits, generator, monkeypatch):
         sample_motions(generator, begun, SMALL, 0)
 
 
+@torch.no_grad()
+def test_motions_to_refine_can_be_drawn_with_a_memory(gaits, generator):
+    begun = Windows(gaits.clips("train"), 60)
+    draw = lambda **more: torch.stack(
+        sample_motions(generator, begun, replace(SMALL, seconds=2.0, **more), 0)
+    )
+    usual, slow, warm = draw(), draw(memory=0.9), draw(memory=0.9, temperature=0.5)
+    chance = torch.Generator().manual_seed(0)
+    start = generator.observe(begun.draw(3, chance))
+    for found, sampling in [
+        (usual, {"temperature": 0.1}),
+        (slow, {"temperature": 0.1, "memory": 0.9}),
+        (warm, {"temperature": 0.5, "memory": 0.9}),
+    ]:
+        g = torch.Generator()
+        g.set_state(chance.get_state())
+        assert torch.equal(found, generator.generate(60, start, generator=g, **sampling))
+    assert not torch.allclose(usual, slow) and not torch.allclose(slow, warm)
+
+
+def test_a_game_of_before_there_was_a_memory_goes_on(game, tmp_path):
+    game(tmp_path)
+    tensors, facts = read_checkpoint(tmp_path / "checkpoint.safetensors")
+    for name in ("memory", "temperature"):
+        del facts["preset"][name]
+    save_file(tensors, tmp_path / "checkpoint.safetensors", {"motionlab": json.dumps(facts)})
+    with pytest.raises(TrainingError, match="other memory"):
+        game(tmp_path, replace(SMALL, memory=0.9))
+    assert game(tmp_path, replace(SMALL, steps=6))[-1]["step"] == 6
+
+
 def test_what_cannot_be_played_is_said(game, tmp_path, gaits):
     for wrong, message in [
         ({"batch": 3}, "even"), ({"history": 2}, "a batch and more"), ({"turns": 0}, "turns"),
         ({"refiner_rate": 0.0}, "refiner_rate"), ({"piece": 3}, "a divisor of frames"),
-        ({"root_weight": float("nan")}, "root_weight"),
+        ({"root_weight": float("nan")}, "root_weight"), ({"memory": 1.0}, "memory"),
+        ({"memory": float("nan")}, "memory"), ({"temperature": -0.1}, "temperature"),
     ]:  # fmt: skip
         with pytest.raises(TrainingError, match=message):
             replace(SMALL, **wrong)

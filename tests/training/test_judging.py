@@ -28,6 +28,22 @@ def judge(generator, gaits):
     return Judge(generator, gaits, "train", seconds=3.0)
 
 
+@pytest.mark.parametrize("said", [None, {"temperature": 0.5, "memory": 0.9}])
+def test_samples_are_drawn_as_the_generator_is_used_or_as_is_said(
+    generator, gaits, monkeypatch, said
+):
+    class Drawn(Exception):
+        pass
+
+    def generate(_frames, _state, generator, **sampling):
+        raise Drawn(sampling)
+
+    monkeypatch.setattr(generator, "generate", generate)
+    with pytest.raises(Drawn) as drawn:
+        Judge(generator, gaits, "train", seconds=1.0, sampling=said)
+    assert drawn.value.args == (said or {"temperature": 0.1},)
+
+
 @pytest.fixture
 def quick(monkeypatch):
     monkeypatch.setattr(judging, "UPDATES", 60)

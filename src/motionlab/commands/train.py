@@ -112,7 +112,10 @@ class Train:
         generator = load(start)
         check_generates(generator, self.start or self.model)
         data = Prepared.find(self.data or "locomotion", **self.folder.reading())
-        judge = Judge(generator, data)  # says now what it would have to say after the game
+        sampling = preset.sampling(generator.sampling)
+        judge = Judge(
+            generator, data, sampling=sampling
+        )  # says now what it would say after the game
         device = None if self.accelerator == "auto" else self.accelerator
         train_game(
             generator, data, preset, out, name=self.model, start=start, device=device, progress=True

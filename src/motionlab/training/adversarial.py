@@ -276,7 +276,8 @@ def sample_motions(generator, begun: Windows, preset: GamePreset, number: int) -
     for attempt in count():
         chance = torch.Generator().manual_seed(preset.seed * 1_000_003 + 997 * number + attempt)
         start = generator.observe(begun.draw(preset.samples, chance))
-        made = generator.generate(frames, start, generator=chance, **generator.sampling)
+        sampling = preset.sampling(generator.sampling)
+        made = generator.generate(frames, start, generator=chance, **sampling)
         found += [motion for motion in made if motion.isfinite().all()]
         if len(found) >= preset.samples:
             return found[: preset.samples]
@@ -290,9 +291,11 @@ def _resume(path: Path, game: Game, optimizer, facts: dict) -> None:
         return
     tensors, found = read_checkpoint(path)
     same = ("name", "data", "generator_hash", "model")
-    before, now = dict(found.get("preset", {})), dict(facts["preset"])
+    # settings that an older game did not know are at their defaults in it
+    before = asdict(GamePreset(1, 1)) | found.get("preset", {})
+    now = facts["preset"]
     other = [key for key in same if found.get(key, facts[key]) != facts[key]]
-    other += [key for key in now if key != "steps" and before.get(key) != now[key]]
+    other += [key for key in now if key != "steps" and before[key] != now[key]]
     if other:
         raise TrainingError(
             f"{path}: belongs to a game with other {', '.join(other)}; repeat its settings to go on "

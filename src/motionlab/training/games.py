@@ -76,6 +76,10 @@ class GamePreset:
     """Length of each of them."""
     refresh: int = 100
     """Steps after which they are made anew."""
+    memory: float = 0.0
+    """Of the noise that they are drawn with (see `LstmGmm.generate`); 0: as the generator is used."""
+    temperature: float = 0.0
+    """At which they are drawn; 0: as the generator is used."""
     seed: int = 0
     """Start of all chance."""
 
@@ -86,7 +90,7 @@ class GamePreset:
         wrong += [name for name in ("refiner_rate", "discriminator_rate", "seconds")
                   if not 0 < getattr(self, name) < math.inf]  # fmt: skip
         least_zero = ("warmup", "root_weight", "clip", "instance_noise", "steepness_weight", "piece",
-                      "slow", "reach", "change_weight")  # fmt: skip
+                      "slow", "reach", "change_weight", "temperature")  # fmt: skip
         wrong += [name for name in least_zero if not 0 <= getattr(self, name) < math.inf]
         if self.batch < 2 or self.batch % 2:
             wrong.append("batch (an even number)")
@@ -94,10 +98,15 @@ class GamePreset:
             wrong.append("history (0, or a batch and more)")
         if self.piece and self.frames % self.piece:
             wrong.append("piece (a divisor of frames)")
-        wrong += [f"{name} (from 0 to 1)" for name in ("decay", "average")
+        wrong += [f"{name} (from 0 to 1)" for name in ("decay", "average", "memory")
                   if not 0 <= getattr(self, name) < 1]  # fmt: skip
         if wrong:
             raise TrainingError(f"These settings of a game make no sense: {', '.join(wrong)}.")
+
+    def sampling(self, usual: dict[str, float]) -> dict[str, float]:
+        """What motions are drawn with, by a generator whose `sampling` is the usual."""
+        chosen = {"memory": self.memory, "temperature": self.temperature}
+        return usual | {key: value for key, value in chosen.items() if value}
 
     @property
     def weights(self) -> str:

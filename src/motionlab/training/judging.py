@@ -125,6 +125,7 @@ class Judge:
     split : whose clips of two seconds and more are used.
     seconds : length of a sample.
     seed : of the samples' chance.
+    sampling : what the samples are drawn with; None: as the generator is used.
 
     Raises
     ------
@@ -138,7 +139,9 @@ class Judge:
         split: str = "val",
         seconds: float = 10.0,
         seed: int = 0,
+        sampling: dict[str, float] | None = None,
     ) -> None:
+        sampling = generator.sampling if sampling is None else sampling
         data = data.matching(generator.encoding)
         seen = round(OBSERVED * generator.fps)
         clips = [clip for clip in data.clips(split) if len(clip) >= seen]
@@ -152,7 +155,7 @@ class Judge:
         with torch.no_grad():
             made = generator.generate(
                 round(seconds * generator.fps), generator.observe(begun),
-                generator=torch.Generator().manual_seed(seed), **generator.sampling,
+                generator=torch.Generator().manual_seed(seed), **sampling,
             )  # fmt: skip
         sound = made.isfinite().all(-1).all(-1)
         self.made = made[sound]
