@@ -43,10 +43,39 @@ def test_sample_options_reach_the_model(here, shipped):
     usual = sampled()
     assert torch.equal(usual, sampled())
     for options in (["--seed", "1"], ["--temperature", "1"], ["--component-temperature", "3"],
-                    ["--noise", "0.5"], ["--start", "2"]):  # fmt: skip
+                    ["--noise", "0.5"], ["--memory", "0.9"], ["--start", "2"]):  # fmt: skip
         assert not torch.equal(usual, sampled(*options)), options
     name = motionlab.load(shipped).start_names[2]
     assert torch.equal(sampled("--start", "2"), sampled("--start", name))
+
+
+def test_sample_with_a_memory_draws_it_and_goes_on_if_it_is_longer(here, shipped):
+    def sampled(name, *options):
+        more = ["--memory", "0.9", "--out", name, *options]
+        assert main(["sample", str(shipped), *more]) == 0
+        return motionlab.read_bvh(name).positions()
+
+    short, long = sampled("short.bvh", "--seconds", "1"), sampled("long.bvh", "--seconds", "2")
+    torch.testing.assert_close(long[:30], short)
+    assert torch.equal(short, sampled("white.bvh", "--seconds", "1", "--memory", "0.9"))
+    assert not torch.equal(short, sampled("white.bvh", "--seconds", "1", "--memory", "0"))
+    model = motionlab.load(shipped)
+    chance, settings = torch.Generator().manual_seed(0), {"temperature": 0.5, "memory": 0.9}
+    with torch.no_grad():
+        first, state = model.go_on(13, model.starts[0], generator=chance, **settings)
+        second, _ = model.go_on(17, state, generator=chance, **settings)
+    made = model.encoding.to_motion(torch.cat([first, second], 1)[0])
+    torch.testing.assert_close(short, made.positions(), rtol=0, atol=1e-4)
+
+
+def test_what_a_dancer_has_not_is_said(here, capsys):
+    for command in ("sample", "evaluate"):
+        out = ["--out", "a.bvh"] if command == "sample" else ["--data", "gaits"]
+        for option in ("--memory", "--temperature", "--component-temperature"):
+            assert main([command, "aclstm-martial", option, "0.5", *out]) == 1
+            said = capsys.readouterr().err
+            assert f"{option}: AcLstm has none" in said and "Traceback" not in said
+    assert not list(here.iterdir())
 
 
 @pytest.mark.parametrize("knows_contacts", [True, False])
@@ -120,6 +149,9 @@ def test_sample_of_several_characters(here, shipped, capsys):
         (["--component-temperature", "-1"], "component_temperature"),
         (["--temperature", "1e30"], "NaN or infinite"),
         (["--noise", "nan"], "noise is nan"),
+        (["--memory", "1"], "memory is 1.0; it must be"),
+        (["--memory", "-0.1"], "memory is -0.1; it must be"),
+        (["--memory", "nan"], "memory is nan; it must be"),
         (["--seed", "-1"], "from 0 to"),
         (["--seed", str(10**20)], "from 0 to"),
         (["--start", "99"], "there is none"),

@@ -34,6 +34,8 @@ class Evaluate:
     """Factor on the standard deviations; if left out, what suits the weights."""
     component_temperature: float | None = None
     """The same for the choice among the Gaussians."""
+    memory: float | None = None
+    """How much of its chance a frame keeps from the one before, from 0 to less than 1."""
     noise: float | None = None
     """Standard deviation of the noise on the inputs, in normalised units."""
     seed: int = 0
@@ -54,8 +56,8 @@ class Evaluate:
             check_writable(self.out)
         model = load(self.model)
         check_generates(model, self.model)
+        sampling = model.sampling | given(self, model)
         data = Prepared.find(self.data)
-        sampling = model.sampling | given(self)
         found = evaluate(
             model, data, self.split, starts=self.starts, seconds=self.seconds, seed=self.seed,
             **sampling,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import tempfile
@@ -40,6 +41,9 @@ class Sample(Rig):
     """Factor on the standard deviations; if left out, what suits the weights."""
     component_temperature: float | None = None
     """The same for the choice among the Gaussians."""
+    memory: float | None = None
+    """How much of its chance a frame keeps from the one before, from 0, the paper's, to less than 1:
+    with 0.9 samples differ more, and tremble less."""
     noise: float | None = None
     """Standard deviation of the noise on the inputs, in normalised units."""
     seed: int = 0
@@ -72,7 +76,7 @@ class Sample(Rig):
         check_seed(self.seed)
         for path in paths:
             check_writable(path)
-        sampling = model.sampling | given(self)
+        sampling = model.sampling | given(self, model)
         if "temperature" not in sampling and hasattr(model, "components"):
             print("These weights have no temperature of their own, so it is 1, as learned. If the "
                   "body shakes, take less: --temperature 0.3", flush=True)  # fmt: skip
@@ -179,10 +183,19 @@ def check_generates(model: nn.Module, name: str) -> None:
         )
 
 
-def given(command: object) -> dict[str, float]:
-    """Arguments of `generate` that the command line names."""
-    keys = ("temperature", "component_temperature", "noise")
-    return {key: getattr(command, key) for key in keys if getattr(command, key) is not None}
+def given(command: object, model: nn.Module) -> dict[str, float]:
+    """Arguments of the model's `generate` that the command line names.
+
+    Raises MotionLabError if it has one of them not.
+    """
+    keys = ("temperature", "component_temperature", "memory", "noise")
+    named = {key: getattr(command, key) for key in keys if getattr(command, key) is not None}
+    for key in named.keys() - inspect.signature(model.generate).parameters.keys():
+        raise MotionLabError(
+            f"--{key.replace('_', '-')}: {type(model).__name__} has none, since it draws from no "
+            "Gaussians; leave it out. It has --noise."
+        )
+    return named
 
 
 def check_seed(seed: int) -> None:
