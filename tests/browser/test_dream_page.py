@@ -175,8 +175,9 @@ def test_sliders_act_while_it_plays(visit):
     until(page, "figure.dreamer.last > 5")
     page.get_by_label("Temperature", exact=True).fill("0.3")
     page.get_by_label("Input noise").fill("0.1")
+    page.get_by_label("Memory of the noise").fill("0.9")
     settings = value(figure, "dreamer.settings")
-    assert (settings["temperature"], settings["noise"]) == (0.3, 0.1)
+    assert [settings[key] for key in ("temperature", "noise", "memory")] == [0.3, 0.1, 0.9]
     assert value(figure, "dreamer.last") > 5  # and it went on
     page.get_by_label("Characters").fill("3")
     until(page, "figure.player.casts.length === 3")
@@ -188,6 +189,33 @@ def test_sliders_act_while_it_plays(visit):
     until(page, "figure.player.casts.length === 1")
     page.get_by_label("Seed").fill("")  # on the way to another number
     assert value(figure, "dreamer.settings.seed") == 5
+
+
+def test_its_noise_has_the_memory_of_the_slider(visit):
+    """Of the same chance, by the recursion: the state of a character carries the noise."""
+    page = visit().page
+    figure = load(page)
+    page.get_by_role("button", name="Pause").click()
+
+    def noise(memory: float) -> np.ndarray:
+        page.get_by_label("Memory of the noise").fill(str(memory))
+        said = figure.evaluate(
+            """figure => {
+              const { dreamer } = figure.motionlab;
+              dreamer.restart();
+              return [1, 2, 9].map((frame) => {
+                dreamer.reach(frame);
+                return Array.from(dreamer.characters[0].noise);
+              });
+            }"""
+        )
+        return np.array(said)
+
+    white, slow = noise(0), noise(0.9)
+    assert (slow[0] == white[0]).all()  # the first draw knows of no other
+    np.testing.assert_allclose(slow[1], 0.9 * white[0] + 0.19**0.5 * white[1], atol=1e-12)
+    apart, near = (np.abs(some[1] - some[0]).mean() for some in (white, slow))
+    assert near < 0.5 * apart
 
 
 def test_the_picture_moves_and_keys_work(visit):

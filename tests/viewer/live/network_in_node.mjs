@@ -1,13 +1,14 @@
 // Runs web/src/network/ as a page would, for test_dream.py: answers the questions in a JSON file.
 import { readFileSync } from "node:fs";
 import { Dreamer } from "../../../web/src/network/dreamer.js";
-import { Random, sample } from "../../../web/src/network/mixture.js";
+import { LstmGmm } from "../../../web/src/network/lstm_gmm.js";
+import { Random } from "../../../web/src/network/mixture.js";
 import { readWeights } from "../../../web/src/network/weights.js";
 
 const { scripts, look, ask } = JSON.parse(readFileSync(process.argv[2], "utf8"));
 for (const script of scripts) new Function(readFileSync(script, "utf8"))();
 const weights = (name) => readWeights(globalThis.motionlabWeights[name]);
-const settings = { start: 0, temperature: 1, component_temperature: 1, noise: 0, characters: 1, seed: 0 };
+const settings = { start: 0, temperature: 1, component_temperature: 1, memory: 0, noise: 0, characters: 1, seed: 0 };
 const list = (values) => Array.from(values);
 /** What may follow: a mixture, or a frame. */
 const plain = (next) => (next.means ? { log_weights: list(next.logWeights), means: list(next.means), stds: list(next.stds) } : list(next));
@@ -34,16 +35,18 @@ const answers = {
   },
 
   /** Points (frames, characters, ...) and contacts of the first character that a Dreamer makes. */
-  dream({ name, frames, change }) {
+  dream({ name, frames, change, later = {} }) {
     const dreamer = new Dreamer(weights(name), look, { ...settings, ...change });
-    const points = [], contacts = [], disturbed = [];
+    const points = [], contacts = [], disturbed = [], noise = [];
     for (let frame = 0; frame <= frames; frame++) {
+      Object.assign(dreamer.settings, later[frame]); // sliders that are moved
       if (frame) dreamer.advance();
+      noise.push(list(dreamer.characters[0].noise));
       points.push(dreamer.tracks.map((track) => list(track.room(frame))));
       contacts.push(dreamer.tracks[0].at(frame).contacts);
       disturbed.push(list(dreamer.characters[0].input));
     }
-    return { points, contacts, inputs: disturbed };
+    return { points, contacts, inputs: disturbed, noise };
   },
 
   /** A frame after one that was no number. */
@@ -54,10 +57,12 @@ const answers = {
     return { exploded: dreamer.exploded, points: list(dreamer.tracks[0].room(2)) };
   },
 
-  draws({ mixture, count, change }) {
-    const random = new Random(7);
+  /** Frames of one mixture, drawn one after the other, and the noise that the last one leaves. */
+  draws({ mixture, count, change, noise = [] }) {
     const kept = mixture.means.length / mixture.logWeights.length;
-    return Array.from({ length: count }, () => list(sample({ ...mixture, kept }, random, { ...settings, ...change })));
+    const character = { next: { ...mixture, kept }, random: new Random(7), noise };
+    const drawn = Array.from({ length: count }, () => list(LstmGmm.prototype.draw(character, { ...settings, ...change })));
+    return { drawn, noise: list(character.noise) };
   },
 
   chance({ seed, count }) {

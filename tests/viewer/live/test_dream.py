@@ -6,6 +6,7 @@ import copy
 import json
 import re
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from motionlab import MotionLabError, Skeleton, weights
 from motionlab.encodings import BodyFrame, JointAngles, Normalizer, RootRelative
 from motionlab.kinematics import heading
 from motionlab.models import AcLstm, LstmGmm
+from motionlab.models import noise as noise_module
+from motionlab.models.noise import noise_to_draw
 from motionlab.viewer import dream
 from motionlab.viewer.live.dream_page import Dream, page_figure
 from motionlab.viewer.live.dream_settings import CONTROLS, trail_of
@@ -158,7 +161,7 @@ MIXTURE = {
 @pytest.mark.parametrize("temperature, component_temperature", [(1, 1), (0.5, 1), (1, 0.5), (2, 2)])
 def test_draws_have_the_moments_of_the_mixture(ask, temperature, component_temperature):
     change = {"temperature": temperature, "component_temperature": component_temperature}
-    drawn = np.array(ask("draws", mixture=MIXTURE, count=20_000, change=change))
+    drawn = np.array(ask("draws", mixture=MIXTURE, count=20_000, change=change)["drawn"])
     chances = np.array([0.2, 0.5, 0.3]) ** (1 / component_temperature)
     chances /= chances.sum()
     chosen = np.abs(drawn[:, 1:] - [10, 50, 90]).argmin(1)
@@ -167,6 +170,59 @@ def test_draws_have_the_moments_of_the_mixture(ask, temperature, component_tempe
     for component in range(3):
         scaled = (drawn[chosen == component] - means[component]) / (temperature * stds[component])
         assert stats.kstest(scaled.ravel(), "norm").pvalue > 1e-4
+
+
+def remembered(white: np.ndarray, memory: float, before: np.ndarray | None = None) -> np.ndarray:
+    """What `next_noise` of Python makes of white noise (frames, kept)."""
+    rows, noise = [], before
+    for fresh in torch.from_numpy(white):
+        with patch.object(noise_module, "normal", lambda *_, fresh=fresh: fresh):
+            noise = noise_to_draw(torch.zeros(0) if noise is None else noise, fresh, memory, None)
+        rows.append(noise)
+    return torch.stack(rows).numpy()
+
+
+def test_noise_with_a_memory_is_that_of_python(ask):
+    """One Gaussian of mean 0 and deviation 1: what is drawn is the noise."""
+    plain = {"logWeights": [0.0], "means": [0.0] * 3, "stds": [1.0] * 3}
+    draws = lambda **more: ask("draws", mixture=plain, count=200, **more)
+    white = np.array(draws(change={"memory": 0})["drawn"])
+    for memory in (0.0, 0.5, 0.9, 0.99):
+        said = draws(change={"memory": memory})
+        assert np.abs(remembered(white, memory) - said["drawn"]).max() < 1e-5
+        assert np.abs(np.array(said["noise"]) - said["drawn"][-1]).max() < 1e-6
+        before = torch.tensor([3.0, -2.0, 0.0], dtype=torch.float64)
+        said = draws(change={"memory": memory}, noise=before.tolist())
+        assert np.abs(remembered(white, memory, before) - said["drawn"]).max() < 1e-5
+
+
+def test_a_dream_carries_its_noise_and_a_slider_may_be_moved(ask):
+    """The chance of a dream is the same whatever the memory; only what is made of it differs."""
+    white = np.array(ask("dream", frames=40, change={})["noise"][1:])
+    slow = ask("dream", frames=40, change={"memory": 0.9})
+    assert slow["noise"][0] == []  # nothing was drawn yet
+    assert np.abs(remembered(white, 0.9) - slow["noise"][1:]).max() < 1e-5
+    moved = ask("dream", frames=40, change={}, later={20: {"memory": 0.9}})
+    expected = remembered(white[19:], 0.9, torch.from_numpy(white[18]))
+    assert (white[:19] == np.array(moved["noise"][1:20])).all()
+    assert np.abs(expected - moved["noise"][20:]).max() < 1e-5
+    points = [np.array(said["points"]) for said in (slow, moved)]
+    assert np.abs(points[0][2:] - points[1][2:]).max() > 1e-3
+
+
+def test_a_start_in_the_middle_of_a_motion_brings_its_noise(model, tmp_path):
+    """With almost all of it remembered, the page draws what Python draws."""
+    chance = torch.Generator().manual_seed(0)
+    _, state = model.go_on(10, model.starts, generator=chance, memory=0.9)
+    later = copy.copy(model)
+    later.starts = state
+    still = {"memory": 1 - 1e-12, "temperature": 0.5, "component_temperature": 1e-4}
+    said = asking(later, tmp_path)("dream", frames=20, change={**still, "start": 1})
+    features = torch.cat([state.frame[[1]], model.generate(20, state[1], **still)[0]])
+    points = model.encoding.positions(features).flatten(1).numpy()
+    assert np.abs(np.array(said["points"])[:, 0] - points).max() < 1e-3
+    fresh = model.generate(20, model.starts[1], **still)[0]
+    assert (fresh - features[1:]).abs().max() > 0.01
 
 
 @pytest.mark.parametrize("seed", [0, 1, 5000, 9_999_003])

@@ -37,8 +37,8 @@ def player(box) -> Player:
 
 def test_there_is_a_field_for_every_choice_of_generate(box):
     assert set(fields(box)) == {
-        "Start", "Temperature", "Component temperature", "Input noise", "Characters", "Seed",
-        "Seconds",
+        "Start", "Temperature", "Component temperature", "Memory of the noise", "Input noise",
+        "Characters", "Seed", "Seconds",
     }  # fmt: skip
     assert fields(box)["Temperature"].value == 0.5  # as the weights ask for
     assert player(box).payload["frames"] == 31  # the start itself and a second
@@ -58,8 +58,8 @@ def test_a_model_may_have_moved_since_it_was_loaded(model, box):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("Start", 1), ("Temperature", 1.0), ("Component temperature", 0.05), ("Input noise", 0.3),
-     ("Seed", 7)],
+    [("Start", 1), ("Temperature", 1.0), ("Component temperature", 0.05),
+     ("Memory of the noise", 0.9), ("Input noise", 0.3), ("Seed", 7)],
 )  # fmt: skip
 def test_a_change_brings_another_motion_and_back_the_same(box, field, value):
     before, old = player(box).payload, fields(box)[field].value

@@ -29,7 +29,7 @@ export class AcLstm {
   }
 
   /** What follows, as it is. */
-  draw(frame) {
-    return frame;
+  draw({ next }) {
+    return next;
   }
 }

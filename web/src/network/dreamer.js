@@ -51,6 +51,7 @@ export class Dreamer {
       input: this.normalize(start.frame),
       hidden: layers(start.hidden),
       cell: layers(start.cell),
+      noise: start.noise, // of the last draw; empty if there was none
       place: this.encoding.begin(start.frame),
       random: new Random(1000 * this.settings.seed + number),
       track: new LiveTrack(this.encoding, this.fps, this.last, this.look),
@@ -64,7 +65,7 @@ export class Dreamer {
   /** One frame more for all characters. */
   advance() {
     const { noise } = this.settings;
-    const drawn = this.characters.map(({ next, random }) => this.network.draw(next, random, this.settings));
+    const drawn = this.characters.map((character) => this.network.draw(character, this.settings));
     this.characters.forEach((character, k) => {
       character.input = noise ? drawn[k].map((value) => value + noise * character.random.normal()) : drawn[k];
     });

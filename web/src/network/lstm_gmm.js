@@ -2,7 +2,7 @@
 // Everything here is in normalised units.
 import { Linear } from "./affine.js";
 import { Lstm } from "./lstm.js";
-import { sample, toMixture } from "./mixture.js";
+import { choose, nextNoise, point, toMixture } from "./mixture.js";
 
 export class LstmGmm {
   /** `layers` and `settings` (components, kept, skip, reach, floor) from weights.js. */
@@ -30,9 +30,12 @@ export class LstmGmm {
     return states.map(({ input }, k) => toMixture(numbers[k], input, this.settings));
   }
 
-  /** A frame of what may follow. */
-  draw(mixture, random, temperatures) {
-    return sample(mixture, random, temperatures);
+  /** A frame of what may follow a character, who keeps the noise in it for the next one. */
+  draw(character, settings) {
+    const { next, random } = character;
+    const component = choose(next, random, settings);
+    character.noise = nextNoise(character.noise, next.kept, random, settings);
+    return point(next, component, character.noise, settings);
   }
 }
 

@@ -13,14 +13,29 @@ export function toMixture(numbers, input, { components, kept, skip, reach, floor
   return { logWeights, means, stds, kept };
 }
 
-/** One draw: first a component, then a point from its Gaussian. */
-export function sample({ logWeights, means, stds, kept }, random, { temperature, component_temperature }) {
+/** A component, drawn by the weights. */
+export function choose({ logWeights }, random, { component_temperature }) {
   const chances = logSoftmax(logWeights.map((value) => value / component_temperature)).map(Math.exp);
   let chosen = 0;
   for (let rest = random.uniform() - chances[0]; rest > 0 && chosen < chances.length - 1; rest -= chances[chosen]) chosen++;
-  const drawn = new Float32Array(kept);
-  for (let i = 0, at = chosen * kept; i < kept; i++, at++) drawn[i] = means[at] + temperature * stds[at] * random.normal();
-  return drawn;
+  return chosen;
+}
+
+/** The point of a component's Gaussian that `noise` stands for, in deviations. */
+export function point({ means, stds, kept }, component, noise, { temperature }) {
+  const at = component * kept;
+  return Float32Array.from(noise, (value, i) => means[at + i] + temperature * stds[at + i] * value);
+}
+
+/** `count` numbers of noise with a memory (motionlab/models/noise.py); the noise before may be empty. */
+export function nextNoise(noise, count, random, { memory }) {
+  const rest = Math.sqrt(1 - memory ** 2);
+  const next = new Float64Array(count);
+  for (let i = 0; i < count; i++) {
+    const white = random.normal();
+    next[i] = memory && noise.length ? memory * noise[i] + rest * white : white;
+  }
+  return next;
 }
 
 function logSoftmax(values) {

@@ -47,7 +47,7 @@ function readLayer({ columns, bias, weight, scales }) {
 export function readWeights(file) {
   const { kind, fps, kept, encoding } = file;
   const { enter, lstm, leave } = file.layers;
-  const starts = file.starts.map(({ name, frame, hidden, cell }) => ({ name, frame: floats(frame), hidden: floats(hidden), cell: floats(cell) }));
+  const starts = file.starts.map(({ name, frame, hidden, cell, noise }) => ({ name, frame: floats(frame), hidden: floats(hidden), cell: floats(cell), noise: floats(noise) }));
   return {
     kind,
     fps,

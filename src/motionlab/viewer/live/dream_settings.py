@@ -35,6 +35,8 @@ CONTROLS = (
             "learned, less is calmer", 0.05, 2, 0.01, 1),
     Control("component_temperature", "Component temperature", "Near 0 the likeliest component "
             "always wins; 1 is what was learned", 0.05, 2, 0.05, 1),
+    Control("memory", "Memory of the noise", "How much of its chance a frame keeps from the one "
+            "before: with 0 it trembles, with 0.9 it changes its mind", 0, 0.99, 0.01, 0),
     Control("noise", "Input noise", "Standard deviation of what is added to all that the network "
             "sees", 0, 1, 0.01, 0),
     Control("characters", "Characters", "As many futures of the same start", 1, 6, 1, 1),

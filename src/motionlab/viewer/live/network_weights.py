@@ -23,6 +23,8 @@ from ...errors import ViewerError
 
 GLOBAL = "motionlabWeights"  # where the page looks for what a script of weights brings
 
+_STATE = "frame", "hidden", "cell", "noise"  # what a page knows of a start
+
 # Matrices, side by side, and bias of a layer. An LSTM's two biases are only ever added.
 Layer = tuple[list[Tensor], Tensor]
 
@@ -64,7 +66,7 @@ def weights_script(model: nn.Module, name: str, rounded: bool = True) -> Weights
         "layers": {**packed, "leave": packed["leave"][0]},
         "encoding": _encoding(model.encoding),
         "starts": [
-            {"name": label, **{key: _base64(part[i]) for key, part in starts._asdict().items()}}
+            {"name": label, **{key: _base64(getattr(starts, key)[i]) for key in _STATE}}
             for i, label in enumerate(model.start_names)
         ],
     }
