@@ -160,6 +160,8 @@ STEADY, LIVELY = (50, 51, 52), (1.2, 1.2, 1.2)
 
 CASES = [
     ("W1-variety", "reproduced", variety([1.0] * 6)),
+    ("W1-variety-memory", "reproduced", variety([1.0] * 6)),
+    ("W1-variety-memory", "not", variety([0.9] * 6)),
     ("W1-variety", "partly", variety([2.0] * 6, sound=0.8)),
     ("W1-variety", "partly", variety([1.2] * 3 + [0.9] * 3)),
     ("W1-variety", "not", variety([9.0] * 2 + [0.9] * 4)),
@@ -314,6 +316,9 @@ def test_reproduce_lists_what_is_missing_in_order(clone, capsys):
     Reproduce(("W1", "W8"), dry_run=True).run()
     assert commands(capsys) == [
         "python -m experiments.rnn_gan.samples --model lstm-gmm",
+        "python -m experiments.rnn_gan.memory --model lstm-gmm",
+        "python -m experiments.rnn_gan.samples --model lstm-gmm --sampling "
+        "results/lstm_gmm_memory.json --output results/lstm_gmm_memory_samples.json",
         "python -m experiments.rnn_gan.initial_state --model lstm-gmm",
         "python -m experiments.claims.verdicts W1 W8",
     ]

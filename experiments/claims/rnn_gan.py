@@ -297,7 +297,7 @@ def w11(limits: dict, found: dict) -> Verdict:
 
 
 RULES = {
-    "W1-variety": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
+    "W1-variety": w1_variety, "W1-variety-memory": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
     "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
     "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W3": w3, "W4": w4,
     "W4-generator": w4_generator, "W8": w8, "W10": w10, "W11": w11,

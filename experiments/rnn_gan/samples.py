@@ -1,8 +1,9 @@
 """W1: does the generator walk without end, in many ways, like people, and not like a tape?
 
     python -m experiments.rnn_gan.samples [--model lstm-gmm] [--starts 100] [--frames 18000]
+    python -m experiments.rnn_gan.samples --sampling results/lstm_gmm_memory.json --output ...
 
-What is measured and how it is judged stands in claims.yaml. Batches of rollouts are kept in
+The noise is white, as the paper's, if it isn't said otherwise. What is measured and how it is judged stands in claims.yaml. Batches of rollouts are kept in
 runs/samples/: stopped and started again, it goes on.
 """
 
@@ -24,6 +25,7 @@ from motionlab.encodings import BodyFrame, Encoding, Normalizer
 from motionlab.training import Prepared
 from motionlab.training.checkpoints import write_whole
 from motionlab.training.evaluation import measured, over_all
+from motionlab.training.finish import fit_temperature
 from motionlab.weights import find
 
 from ..common import record, rollouts
@@ -46,17 +48,20 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--frames", type=int, default=18_000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--temperature", type=float, help="another than fits the weights best")
+    parser.add_argument("--sampling", help="result whose `sampling` is taken, such as memory.py's")
     parser.add_argument("--output", help="results/MODEL_samples.json if left out")
     chosen = parser.parse_args(arguments)
     output = chosen.output or f"results/{Path(chosen.model).stem.replace('-', '_')}_samples.json"
     begin = time.perf_counter()
     model, path = motionlab.load(chosen.model), find(chosen.model)
     weights = record.about_weights(model, path)
-    sampling = dict(model.sampling)
-    if chosen.temperature:
-        sampling["temperature"] = chosen.temperature
     full = Prepared.find(chosen.data)
     data = full.matching(model.encoding)
+    sampling = white(model, data)
+    if chosen.sampling:
+        sampling = json.loads(Path(chosen.sampling).read_text(encoding="utf-8"))["sampling"]
+    if chosen.temperature:
+        sampling["temperature"] = chosen.temperature
     judge = rollouts.judge_of(data)
     seen = round(OBSERVED * model.fps)
     clips = [clip for clip in data.clips("test") if len(clip) >= seen]
@@ -76,23 +81,46 @@ def main(arguments: list[str] | None = None) -> None:
     record.write(record.provenance(begin, chosen.seed, data) | result, output)
 
 
+def white(model: nn.Module, data: Prepared) -> dict[str, float]:
+    """What suits the weights with the paper's white noise: how they are used, or else as is fitted.
+
+    A temperature that goes with a memory is none for white noise.
+    """
+    if not model.sampling.get("memory"):
+        return dict(model.sampling)
+    return {"temperature": fit_temperature(model, data.clips("val"))}
+
+
 # -- from one start -------------------------------------------------------------------------------
+
+People = dict[str, dict[tuple[str, str, str], list[list[float]]]]
+
+
+def people(data: Prepared, judge: Judge) -> People:
+    """Quantities of all training clips, by how long a gait's are and by source, action and style."""
+    points, found = data.encoding.positions, {}
+    for gait, (_, seconds) in GAITS.items():
+        piece, found[gait] = round(seconds * judge.fps), defaultdict(list)
+        for clip_of, its_split, clip in recorded_clips(data):
+            if its_split == "train" and len(clip) >= piece:
+                key = clip_of.source, clip_of.action, clip_of.style
+                found[gait][key].append(quantities(points(clip[:piece]), judge))
+    return found
 
 
 def variety(
-    model: nn.Module, data: Prepared, judge: Judge, seed: int, sampling: dict, split: str = "test"
-) -> dict[str, dict]:
-    """How samples from one start differ, beside how people do who do one thing again."""
+    model: nn.Module, data: Prepared, judge: Judge, seed: int, sampling: dict, split: str = "test",
+    known: People | None = None, at: float = 0.5, samples: int = SAMPLES,
+) -> dict[str, dict]:  # fmt: skip
+    """How samples from one start differ, beside how people do who do one thing again.
+
+    known : from `people`, if it is there. at : which start, as a quantile of their speeds.
+    """
     fps, points = model.fps, model.encoding.positions
     seen, after = round(OBSERVED * fps), round(AFTER * fps)
-    clips, result = recorded_clips(data), {}
+    known, clips, result = known or people(data, judge), recorded_clips(data), {}
     for gait, (actions, seconds) in GAITS.items():
-        piece = round(seconds * fps)
-        real = defaultdict(list)
-        for clip_of, its_split, clip in clips:
-            if its_split == "train" and len(clip) >= piece:
-                key = clip_of.source, clip_of.action, clip_of.style
-                real[key].append(quantities(points(clip[:piece]), judge))
+        piece, real = round(seconds * fps), known[gait]
         everything = np.concatenate(list(map(np.array, real.values())))
         least, most = np.nanmin(everything, 0), np.nanmax(everything, 0)
         held = [
@@ -100,8 +128,8 @@ def variety(
             for clip_of, its_split, clip in clips
             if its_split == split and clip_of.action.startswith(actions)
         ]
-        speed, name, start = sorted(held, key=lambda h: h[0])[len(held) // 2]
-        begun = start[:seen].expand(SAMPLES, -1, -1)
+        speed, name, start = sorted(held, key=lambda h: h[0])[int(at * len(held))]
+        begun = start[:seen].expand(samples, -1, -1)
         ((_, features),) = rollouts.sampled(model, begun, 2 * after, seed, **sampling)
         paths, found, sound = [], [], 0
         for motion in features:
@@ -117,8 +145,8 @@ def variety(
             (g - np.nanmean(g, 0)) * (len(g) / (len(g) - 1)) ** 0.5 for g in groups if len(g) >= 3
         ]
         result[gait] = {
-            "start": name, "start's speed (m/s)": speed, "samples": SAMPLES,
-            "sound": sound / SAMPLES, "clips": sum(map(len, again)), "groups": len(again),
+            "start": name, "start's speed (m/s)": speed, "samples": samples,
+            "sound": sound / samples, "clips": sum(map(len, again)), "groups": len(again),
             "quantities": {
                 quantity: {
                     "samples": _quantiles(np.array(found)[:, i]),
@@ -132,6 +160,15 @@ def variety(
             ],
         }  # fmt: skip
     return result
+
+
+def over_people(variety: dict[str, dict]) -> dict[str, float]:
+    """Spreads of samples over those of people who do the same again, of what `variety` found."""
+    return {
+        f"{gait}, {quantity}": spreads["samples"]["spread"] / spreads["the same again"]["spread"]
+        for gait, found in variety.items()
+        for quantity, spreads in found["quantities"].items()
+    }
 
 
 def quantities(positions: Tensor, judge: Judge) -> list[float]:

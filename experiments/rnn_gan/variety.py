@@ -47,12 +47,7 @@ def main(arguments: list[str] | None = None) -> None:
         beside = evaluate(
             model, data, "val", starts=chosen.starts, seconds=10, seed=chosen.seed, **sampling
         )
-        ratios = {
-            f"{gait}, {quantity}": spreads["samples"]["spread"]
-            / spreads["the same again"]["spread"]
-            for gait, its in found.items()
-            for quantity, spreads in its["quantities"].items()
-        }
+        ratios = samples.over_people(found)
         rows.append({
             "turned up": changed,
             "sampling": sampling,
