@@ -1,7 +1,8 @@
 """Make shipped weights of a training's: writes src/motionlab/weights/NAME.safetensors and NAME.md.
 
     python -m experiments.shipping.weights lstm-gmm runs/lstm-gmm-ship/best.safetensors \
-        [--data locomotion] [--temperature 0.8] [--component-temperature 1] [--noise 0] [--folder ...]
+        [--data locomotion] [--temperature 0.8] [--component-temperature 1] [--memory 0] [--noise 0] \
+        [--folder ...]
 
 Rounds the parameters to half precision, adds states to start from, of validation clips, fits the
 temperature of a mixture on these clips unless one is given, and says on the card what the weights
@@ -39,12 +40,13 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--data", help="name, folder or prepared file; as its training if left out")
     parser.add_argument("--folder", type=Path, default=FOLDER)
     parser.add_argument("--temperature", type=float, help="for samples, if not the one that fits")
-    for option in ("component-temperature", "noise"):
-        parser.add_argument(f"--{option}", type=float, help="for samples, if others than 1, 0")
+    for option in ("component-temperature", "memory", "noise"):
+        parser.add_argument(f"--{option}", type=float, help="for samples, if others than 1, 0, 0")
     parser.add_argument("--remark", default="", help="what else it can't do, for the card")
     chosen = parser.parse_args(arguments)
     sampling = {
-        key: getattr(chosen, key) for key in ("temperature", "component_temperature", "noise")
+        key: getattr(chosen, key)
+        for key in ("temperature", "component_temperature", "memory", "noise")
     }
     sampling = {key: value for key, value in sampling.items() if value is not None}
     style = chosen.name.rpartition("-")[2] if chosen.name.startswith("aclstm") else "locomotion"
