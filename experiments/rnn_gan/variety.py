@@ -3,9 +3,9 @@
     python -m experiments.rnn_gan.variety [--model lstm-gmm]
 
 The claim is judged at the temperature that the weights are shipped with (samples.py). Here
-the three sources of chance are turned up one by one, on validation clips: the choice among the
-Gaussians, their width, and noise on what is fed back. With more choice the width is fitted anew, so
-that samples stay as lively as people.
+the sources of chance are turned up one by one, on validation clips: the choice among the Gaussians,
+their width, noise on what is fed back, and how long noise lasts. With more choice or a memory the
+width is fitted anew, so that samples stay as lively as people.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from motionlab.weights import find
 from ..common import record, rollouts
 from . import samples
 
-CHOICES, WIDTHS, NOISES = (1.0, 2.0, 4.0), (0.5, 1.0), (0.05, 0.1)
+CHOICES, WIDTHS, NOISES, MEMORIES = (1.0, 2.0, 4.0), (0.5, 1.0), (0.05, 0.1), (0.8, 0.9)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -74,6 +74,9 @@ def settings(model: nn.Module, data: Prepared) -> list[tuple[str, dict[str, floa
     calm = rows[0][1]
     rows += [("temperature", calm | {"temperature": width}) for width in WIDTHS]
     rows += [("noise", calm | {"noise": noise}) for noise in NOISES]
+    for memory in MEMORIES:
+        width = fit_temperature(model, clips, memory=memory)
+        rows.append(("memory", calm | {"temperature": width, "memory": memory}))
     return rows
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from experiments.rnn_gan import memory, samples
+from experiments.rnn_gan import memory, samples, variety
 
 SIX = [f"{gait}, {quantity}" for gait in samples.GAITS for quantity in samples.QUANTITIES]
 
@@ -49,6 +49,23 @@ def test_white_noise_is_tried_first_and_every_pair_once(monkeypatch):
     assert tried[0] == {"temperature": 0.29, "memory": 0.0}
     assert len({tuple(pair.values()) for pair in tried}) == len(tried) == 21
     assert {"temperature": 0.3, "memory": 0.9} in tried
+
+
+def test_what_is_turned_up_is_fitted_anew_where_it_changes_how_lively_samples_are(monkeypatch):
+    class Data:
+        clips = staticmethod(lambda split: split)
+
+    width = lambda model, clips, component_temperature=1.0, memory=0.0: (
+        0.3 / component_temperature + memory / 10
+    )
+    monkeypatch.setattr(variety, "fit_temperature", width)
+    rows = [{"turned up": name} | sampling for name, sampling in variety.settings(None, Data)]
+    calm, *others = rows
+    assert calm == {"turned up": "nothing", "temperature": 0.3, "component_temperature": 1.0}
+    assert len({tuple(row.items()) for row in rows}) == len(rows) == 9
+    slow = [row for row in others if row["turned up"] == "memory"]
+    assert [row["temperature"] for row in slow] == pytest.approx([0.38, 0.39])
+    assert all("memory" not in row for row in rows if row not in slow)
 
 
 def test_weights_that_are_used_with_a_memory_have_a_white_row_of_their_own(monkeypatch):
