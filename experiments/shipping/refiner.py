@@ -13,6 +13,7 @@ from pathlib import Path
 
 import motionlab
 from motionlab.training.checkpoints import save_weights, write_whole
+from motionlab.training.games import GamePreset
 from motionlab.training.judging import Judge
 
 from ..common import record
@@ -38,7 +39,8 @@ def ship(name: str, file: Path, generator: str | None, source: str, folder: Path
     of = generator or made["name"].replace("refiner", "lstm-gmm")
     model = motionlab.load(of)
     licence = licence_of(made, data)  # if it is not known, fails before anything is written
-    halved, judge = rounded(refiner), Judge(model, data)
+    sampling = GamePreset(**made["preset"]).sampling(model.sampling)  # as in its game
+    halved, judge = rounded(refiner), Judge(model, data, sampling=sampling)
     told = {"full": judge(refiner.eval()), "half": judge(halved)}
     about = {
         **{key: made[key] for key in ("preset", "data", "step", "seconds")},
