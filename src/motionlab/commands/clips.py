@@ -164,6 +164,7 @@ def write(motion: Motion, path: Path, root_motion: str | None = None) -> None:
 
 def as_options(text: str) -> str:
     """What is said of arguments, as ``up='z'``, in the words of the command line: ``--up=z``."""
-    text = re.sub(r"\b(units|up|root|rigid)='([^']*)'", r"--\1=\2", text)
+    text = re.sub(r"\b(units|up|root|rigid|animation)='([^']*)'", r"--\1=\2", text)
+    text = re.sub(r"(?<![-\w])animation=", "--animation=", text)
     text = re.sub(r"(?<![-\w])fps=", "--file-fps=", text)
     return re.sub(r"(?<![-\w])skeleton=", "--skeleton=", text)

@@ -38,8 +38,9 @@ class Files:
             )
         known = None if self.roles is None else roles.read(self.roles)
         return Reading(
-            units=self.units, up=self.up, roles=known, root=self.root, rigid=self.rigid, **more
-        )
+            units=self.units, up=self.up, roles=known, root=self.root, rigid=self.rigid,
+            animation=self.animation, **more,
+        )  # fmt: skip
 
 
 @dataclass
