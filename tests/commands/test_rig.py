@@ -110,3 +110,24 @@ def test_which_animation_is_asked_for(here, capsys):
         assert f"{option}=Walk" in capsys.readouterr().err
         assert main([*command.split(), option, "Run", "--out", "x.bvh", "--force"]) == 0
         assert same(read_bvh("x.bvh"), WALK, 1e-3)
+
+
+@pytest.mark.parametrize("path", ["folder/tiny.bvh", "folder"])
+@pytest.mark.parametrize("command", ["clean", "retarget"])
+def test_units_come_before_what_they_spoil(here, capsys, command, path):
+    """A body of 1 cm has bones that are none; to name them first would lead astray."""
+    (here / "folder").mkdir()
+    write_bvh(WALK, "folder/tiny.bvh", units="m")
+    out = "done" if path == "folder" else "x.bvh"
+    assert main([command, path, "--out", out]) == 1
+    said = capsys.readouterr().err
+    assert "tiny.bvh: looks as if read wrongly; read it with --units=m. As it is now: " in said
+    assert said.index("--units=m") < said.index("bone")
+
+
+def test_units_of_a_rig_come_before_what_they_spoil(here, capsys):
+    write_bvh(WALK, "tiny.bvh", units="m")
+    assert main(["retarget", "walk.bvh", "--onto", "tiny.bvh", "--out", "x.bvh"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("motionlab: tiny.bvh: from foot to head")
+    assert said.index("--rig-units=m") < said.index("no bone")

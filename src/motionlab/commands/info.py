@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from ..datasets.report import Report
 from ..errors import MotionFileError, MotionLabError
 from ..io.bvh_reading import Reading
 from ..io.bvh_units import foot_to_head
@@ -64,31 +65,29 @@ def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None,
     ------
     MotionFileError : the file can't be read, `roles` do not fit it, or a folder has no motion file.
     """
-    path = Path(path)
+    path, how = Path(path), Reading(roles=roles, **reading)
     if not path.is_dir():
-        motion, doubts = _read(path, roles, reading)
-        return "\n".join([*_sizes(motion, doubts), "#", *_table(motion.skeleton)])
+        motion, doubts = read_motion(path, how)
+        return "\n".join([*_sizes(motion, doubts.values()), "#", *_table(motion.skeleton)])
     files = sorted(file for file in path.rglob("*") if is_motion(file))
     if not files:
         raise MotionFileError(f"{path}: holds no {ENDINGS} file; name one, or a folder of them.")
-    return "\n".join(_line(file, file.relative_to(path), roles, reading) for file in files)
+    report = Report(path, len(files))
+    lines = [_line(file, how, report) for file in files]
+    return "\n".join([*lines, *report.fitting()])
 
 
-def _read(path: Path, roles: Mapping[str, str] | None, reading: dict) -> tuple[Motion, list[str]]:
-    """A motion, and what reading it warned of."""
-    motion, doubts = read_motion(path, Reading(roles=roles, **reading))
-    return motion, list(doubts.values())
-
-
-def _line(file: Path, name: Path, roles: Mapping[str, str] | None, reading: dict) -> str:
+def _line(file: Path, how: Reading, report: Report) -> str:
     """One file of a folder in one line."""
+    name = file.relative_to(report.folder)
     try:
-        motion, doubts = _read(file, roles, reading)
+        motion, doubts = read_motion(file, how)
     except MotionLabError as error:
         return f"{name}: FAULT {error}"
+    report.doubt(file, doubts)
     missing = _missing(motion.skeleton)
     said = f"lacks {', '.join(missing)}" if missing else "has all roles that retargeting needs"
-    return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", said, *doubts])
+    return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", *doubts.values(), said])
 
 
 def _counts(motion: Motion) -> str:
@@ -113,7 +112,7 @@ def _missing(skeleton: Skeleton) -> list[str]:
     return [role for role in NEEDED if role not in skeleton.roles]
 
 
-def _sizes(motion: Motion, doubts: list[str]) -> list[str]:
+def _sizes(motion: Motion, doubts: Iterable[str]) -> list[str]:
     found = [f"{motion.name}: {_counts(motion)}, {_size(motion)}", *doubts]
     return [f"# {' '.join(line.split())}" for line in found]
 

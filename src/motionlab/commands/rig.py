@@ -57,14 +57,16 @@ class Rig:
             raise MotionFileError(_of_the_rig(str(error))) from error
         if is_bvh(name):
             self._like = Path(name)
-        doubts.pop("rate", None)  # how fast it moves is not asked
-        for said in doubts.values():
-            print(f"note: {name}: {_of_the_rig(said)}", flush=True)
         body = Skeleton.canonical()
         try:  # before any clip is tried
             onto_rig(Motion(body, torch.zeros(1, 3), torch.eye(3).repeat(1, 21, 1, 1), 30), rig)
         except MotionLabError as error:
-            raise RetargetError(f"{name}: {_of_the_rig(str(error))}") from error
+            first = [doubts[about] for about in ("units", "up") if about in doubts]
+            said = " As it is now: ".join([*first, str(error)])  # it may be no more than that
+            raise RetargetError(f"{name}: {_of_the_rig(said)}") from error
+        doubts.pop("rate", None)  # how fast it moves is not asked
+        for said in doubts.values():
+            print(f"note: {name}: {_of_the_rig(said)}", flush=True)
         return rig
 
     def write(self, motion: Motion, path: Path, root_motion: str | None = None) -> list[str]:

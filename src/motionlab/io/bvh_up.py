@@ -12,7 +12,7 @@ from torch import Tensor
 from ..errors import BvhError
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .bvh_units import ancestors
+from .bvh_units import Doubt, ancestors
 
 # What x, y and z become where the named axis of the file points up: turned about the file's x, and
 # where that is up itself, about its z. "-y" is the half turn from a camera's axes, whose y is down.
@@ -98,7 +98,7 @@ def _turned_skeleton(skeleton: Skeleton, turn: Tensor) -> Skeleton:
     )
 
 
-def doubt_up(motion: Motion, up: str | None = None) -> str | None:
+def doubt_up(motion: Motion, up: str | None = None) -> Doubt | None:
     """What to say if the trunk, as far as the joints' roles tell it, is hardly ever upright.
 
     motion : turned; up : the file's axis that was said to point up. "y" is how to say that a person
@@ -118,15 +118,17 @@ def doubt_up(motion: Motion, up: str | None = None) -> str | None:
     if up is not None:
         if (sign * trunk[:, axis] > _UPRIGHT).float().mean() < _MOST:
             return None
-        return (
+        return Doubt(
             f"read with up={up!r} the body's trunk is upright in hardly any frame; it points along the "
             f"file's {name}: if that is up, read it with up={name!r}. Of a person who lies, crawls or "
-            "stands on the hands it may be right."
+            "stands on the hands it may be right.",
+            f"up={name!r}",
         )
-    return (
+    return Doubt(
         f"the body's trunk points along {name} and is upright (along y) in hardly any frame; if "
         f"{name} is up in this file, read it with up={name!r}, if the person lies, crawls or "
-        "stands on the hands, with up='y'."
+        "stands on the hands, with up='y'.",
+        f"up={name!r}",
     )
 
 
