@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import any_rig
 import pytest
@@ -143,6 +144,20 @@ def test_look_makes_a_page_that_needs_nothing_else(here, capsys, monkeypatch):
     assert opened == [(here / "y.html").as_uri()]
     assert main(["look", "clips"]) == 0
     assert (here / "clips_pages" / "more" / "b.html").exists()
+
+
+def test_what_is_doubtful_stands_on_the_page(here):
+    """Who gets the page never sees what the command said."""
+    write_bvh(WALK, "lies.bvh", units="m", up="z")
+    (here / "two").mkdir()
+    Path("lies.bvh").rename("two/lies.bvh")
+    write_bvh(WALK, "two/walk.bvh")
+    assert main(["look", "two"]) == 0
+    lies, fine = (Path(f"two_pages/{name}.html").read_text("utf-8") for name in ("lies", "walk"))
+    before = lies.split("<figure")[0]
+    assert before.count('<p class="note">') == 2
+    assert "read it with --up=z" in before and "pass another unit: --units=m" in before
+    assert 'class="note"' not in fine
 
 
 # -- folders --------------------------------------------------------------------------------------
