@@ -13,6 +13,7 @@ from ..errors import MotionLabError
 from ..io import acclaim
 from ..io.bvh_reading import Reading
 from ..io.bvh_units import is_positive
+from ..io.readings import Readings
 from ..io.root_motion import KINDS
 from ..motion import Motion
 from ..retargeting.stance import stances
@@ -72,7 +73,7 @@ class Brought(Written, Rig):
         """The rig's file, "canonical", or None for the clips' own."""
         raise NotImplementedError
 
-    def meet(self, files: list[Path], how: Reading) -> None:
+    def meet(self, files: list[Path], how: Readings) -> None:
         """Learn how the clips' rigs stand, once for all clips of one rig."""
         self._stances: dict[Path, Motion | None] = {}
         name = self.onto_name()
@@ -81,11 +82,12 @@ class Brought(Written, Rig):
         self._rig = self.find_rig(name)
         reference = None
         if self.reference is not None:
-            reference, _ = self.read(self.reference, replace(how, tpose_first=False))
+            its = replace(how.of(self.reference), tpose_first=False)
+            reference, _ = self.read(self.reference, its)
         seen = {}
         for file in files:
             with contextlib.suppress(MotionLabError):  # it is told when its turn comes
-                seen[file] = self.read(file, how)[0]
+                seen[file] = self.read(file, how.of(file))[0]
         stood = stances(list(seen.values()), Skeleton.canonical(), reference)
         self._stances = dict(zip(seen, stood.references, strict=True))
         for said in stood.said:

@@ -16,36 +16,24 @@ from ..errors import MotionFileError, MotionLabError
 from ..io.bvh_reading import Reading
 from ..io.bvh_units import foot_to_head
 from ..io.motion_file import ENDINGS, is_motion, read_motion
-from ..roles import ALL, read
+from ..io.readings import ByFile, Readings
+from ..roles import ALL
+from .folder import Files
 
 if TYPE_CHECKING:
     from ..motion import Motion
     from ..skeleton import Skeleton
 
 
-@dataclass
-class Info:
+@dataclass(kw_only=True)
+class Info(Files):
     """What is in a motion file and which joint is understood as what; a line a file for a folder."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
     """A .bvh, .amc, .glb or .gltf file, or a folder of them."""
-    roles: Annotated[Path | None, arg(metavar="TABLE")] = None
-    """TOML or JSON file that says which joint is which, as this command prints it."""
-    units: float | str | None = None
-    """The file's unit: m, dm, cm, mm, in, ft, or metres per unit; if not said, cm for BVH, m for glTF."""
-    up: str | None = None
-    """The file's axis that points up: y, z, x, or with a minus, as --up=-z."""
-    root: str | None = None
-    """Name of the ROOT, or node, to begin with, of a file that holds several bodies."""
-    rigid: str | None = None
-    """mean: put joints that slide against their parents at their mean offset."""
-    animation: str | None = None
-    """Name or number of the animation to read, of a glTF file that holds several."""
 
     def run(self) -> None:
-        given = None if self.roles is None else read(self.roles)
-        names = ("units", "up", "root", "rigid", "animation")
-        print(describe(self.path, roles=given, **{name: getattr(self, name) for name in names}))
+        print(_described(self.path, self.how(), self.answers()))
 
 
 def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None, **reading) -> str:
@@ -65,15 +53,19 @@ def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None,
     ------
     MotionFileError : the file can't be read, `roles` do not fit it, or a folder has no motion file.
     """
-    path, how = Path(path), Reading(roles=roles, **reading)
+    by_file = reading.pop("by_file", None)
+    return _described(Path(path), Reading(roles=roles, **reading), by_file)
+
+
+def _described(path: Path, how: Reading, by_file: ByFile | None) -> str:
     if not path.is_dir():
-        motion, doubts = read_motion(path, how)
+        motion, doubts = read_motion(path, Readings(path, [path], how, by_file).of(path))
         return "\n".join([*_sizes(motion, doubts.values()), "#", *_table(motion.skeleton)])
     files = sorted(file for file in path.rglob("*") if is_motion(file))
     if not files:
         raise MotionFileError(f"{path}: holds no {ENDINGS} file; name one, or a folder of them.")
-    report = Report(path, len(files))
-    lines = [_line(file, how, report) for file in files]
+    report, readings = Report(path, len(files)), Readings(path, files, how, by_file)
+    lines = [_line(file, readings.of(file), report) for file in files]
     return "\n".join([*lines, *report.fitting()])
 
 
