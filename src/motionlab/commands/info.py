@@ -79,7 +79,8 @@ def _line(file: Path, how: Reading, report: Report) -> str:
     report.doubt(file, doubts)
     missing = _missing(motion.skeleton)
     said = f"lacks {', '.join(missing)}" if missing else "has all roles that retargeting needs"
-    return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", *doubts.values(), said])
+    doubtful = [doubt.rstrip(".") for doubt in doubts.values()]
+    return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", *doubtful, said])
 
 
 def _counts(motion: Motion) -> str:
