@@ -151,24 +151,35 @@ def read(path: str | os.PathLike) -> dict[str, str]:
     ------
     SkeletonError : no such file, its syntax is wrong, or it holds no such table.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        table = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
-    except OSError as error:
-        raise SkeletonError(
-            f"{path}: can't be opened ({error.strerror}); name a TOML or JSON file of roles."
-        ) from error
-    except ValueError as error:  # both parsers', and text that is no UTF-8
-        raise SkeletonError(
-            f"{path}: is no {'JSON' if path.suffix.lower() == '.json' else 'TOML'}: {error}; a line "
-            'there looks like left_foot = "LFoot".'
-        ) from error
-    if not isinstance(table, dict) or not all(isinstance(name, str) for name in table.values()):
+    found = table(path, 'a line there looks like left_foot = "LFoot"')
+    if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):
         raise SkeletonError(
             f'{path}: must be one flat table of joints by role, as left_foot = "LFoot".'
         )
-    return table
+    return found
+
+
+def table(path: str | os.PathLike, example: str) -> object:
+    """What a TOML or JSON file holds; example : what is said of how it should look.
+
+    Raises
+    ------
+    SkeletonError : no such file, or its syntax is wrong.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        found = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
+    except OSError as error:
+        raise SkeletonError(
+            f"{path}: can't be opened ({error.strerror}); name a TOML or JSON file."
+        ) from error
+    except ValueError as error:  # both parsers', and text that is no UTF-8
+        raise SkeletonError(
+            f"{path}: is no {'JSON' if path.suffix.lower() == '.json' else 'TOML'}: {error}; "
+            f"{example}."
+        ) from error
+    return found
 
 
 # -- the tree -------------------------------------------------------------------------------------

@@ -76,7 +76,8 @@ def test_a_folder_has_a_line_for_each_file(walk, tmp_path, capsys):
     assert main(["info", str(tmp_path)]) == 0
     bad, giant, right, lacking = capsys.readouterr().out.splitlines()
     assert bad.startswith("bad.BVH: FAULT ") and "bad.BVH" in bad[15:]
-    assert "; has all roles that retargeting needs; " in giant and "pass another unit" in giant
+    units, roles_ = giant.index("pass another unit"), giant.index("; has all roles")
+    assert units < roles_  # what a wrong unit spoils is not worth a look before
     assert right.endswith(
         ": 21 joints, 30 frames, 1.00 s, 30 fps, 1.34 m from foot to head; has all roles that retargeting needs"
     )
@@ -85,6 +86,19 @@ def test_a_folder_has_a_line_for_each_file(walk, tmp_path, capsys):
     )
     assert main(["info", str(tmp_path), "--units", "0.01"]) == 0
     assert capsys.readouterr().out.splitlines()[2] == right
+
+
+def test_a_mixed_folder_is_sorted_by_what_fits(tmp_path, capsys):
+    whole = gaits.make(seconds=0.2)
+    for name, units in (("a", "m"), ("b", "m"), ("c", "mm"), ("d", "mm"), ("e", "cm")):
+        write_bvh(whole, tmp_path / f"{name}.bvh", units=units)
+    write_bvh(whole, tmp_path / "f.bvh", up="z")
+    assert main(["info", str(tmp_path)]) == 0
+    *_, metres, millimetres = capsys.readouterr().out.splitlines()
+    assert metres == f"{tmp_path}: 2 of 6 files look like units='m': a.bvh, b.bvh"
+    assert millimetres.endswith("2 of 6 files look like units='mm': c.bvh, d.bvh")
+    assert main(["convert", str(tmp_path), "--out", str(tmp_path / "x")]) == 0
+    assert "What looks like --units=m: a.bvh, b.bvh." in capsys.readouterr().out
 
 
 def test_what_it_can_not_do(walk, tmp_path, capsys):

@@ -220,3 +220,22 @@ def test_a_rest_pose_that_stands_already_stays_also_if_its_roles_had_to_be_said(
     assert said.skeleton.roles == known.skeleton.roles
     turned = read_bvh(tmp_path / "said.bvh", up="z")  # nobody knows where its trunk is
     assert (turned.positions() - known.positions()).abs().max() < 1e-4
+
+
+@pytest.mark.parametrize("up", TURNED)
+@pytest.mark.parametrize("root_motion", [None, "ground"])
+def test_written_with_an_axis_up_it_is_read_with_it(up, root_motion, tmp_path):
+    motion, path = walk(), tmp_path / "clip.bvh"
+    write_bvh(motion, path, up=up, units="in", root_motion=root_motion)
+    read, raw = (read_bvh(path, units="in", up=axis) for axis in (up, "y"))
+    torch.testing.assert_close(read.positions(), motion.positions(), rtol=0, atol=1e-5)
+    expected = torch.stack(TURNED[up](*raw.positions().unbind(-1)), -1)  # the file itself is turned
+    torch.testing.assert_close(expected, motion.positions(), rtol=0, atol=1e-5)
+    torch.testing.assert_close(read.rotations, motion.rotations, rtol=0, atol=1e-5)
+    assert read.skeleton.rotation_orders == motion.skeleton.rotation_orders
+
+
+def test_what_is_no_axis_is_not_written(tmp_path):
+    with pytest.raises(BvhError, match="up='w' is no axis"):
+        write_bvh(walk(0.1), tmp_path / "clip.bvh", up="w")
+    assert not list(tmp_path.iterdir())

@@ -214,6 +214,8 @@ def test_units_and_up_are_said_or_doubted(walk, tmp_path):
     with pytest.warns(UserWarning, match=r"lying\.glb: .*up='z'") as told:
         read_gltf(path)
     assert len(told) == 1
+    with pytest.warns(UserWarning, match=r"read with up='-y' .*up='z'"):
+        read_gltf(path, up="-y")
     upright = read_gltf(path, up="z")
     assert float((upright.positions() - walk.positions()).abs().max()) < 1e-4
 

@@ -334,3 +334,14 @@ def test_a_prepared_file_has_been_read(gaits, tmp_path):
     gaits.save(tmp_path / "gaits.npz")
     with pytest.raises(DataError, match="leave out units"):
         Prepared.find(tmp_path / "gaits.npz", units="m")
+
+
+def test_an_axis_that_was_said_and_is_wrong_is_told_with_all_clips(tmp_path):
+    """That y is up is how to say that people lie, so reading says nothing; a network would learn it."""
+    for i in range(10):
+        up = "z" if i in (3, 4) else "y"
+        write_bvh(made.make(seconds=1, speed=1 + i / 10, seed=i), tmp_path / f"{i}.bvh", up=up)
+    with pytest.warns(UserWarning) as caught:
+        prepare(tmp_path, up="y")
+    (said,) = [str(w.message) for w in caught if "learn to lie" in str(w.message)]
+    assert "in 2 of 10 clips, read with the up that was said" in said and "frame: 3, 4." in said

@@ -9,6 +9,7 @@ import torch
 from glb_reader import Glb
 
 import motionlab
+from motionlab import datasets
 from motionlab.__main__ import main
 from motionlab.encodings import JointAngles
 from motionlab.solvers import lock_feet
@@ -112,7 +113,7 @@ def test_sample_onto_a_rig_and_as_glb(here, shipped, capsys):
     onto = ["--skeleton", "rig.bvh", "--rig-units", "m"]
     assert main([*command, *onto, "--out", "b.bvh"]) == 0
     assert "onto rig, from foot to head 1.34 m and now 1.61 m" in capsys.readouterr().out
-    found = motionlab.read_bvh("b.bvh")
+    found = motionlab.read_bvh("b.bvh", units="m")  # as the rig is
     assert found.skeleton.matches(motionlab.read_bvh("rig.bvh", units="m").skeleton)
     expected = motion.retarget(taller).positions()
     torch.testing.assert_close(found.positions(), expected, rtol=0, atol=1e-3)
@@ -222,6 +223,18 @@ def test_evaluate_prints_and_writes(here, shipped, gaits, capsys):
     for path, said in [("none/e.json", "can't be written to"), (".", "is a folder")]:
         assert main([*command[:-1], path]) == 1
         assert said in capsys.readouterr().err
+
+
+def test_evaluate_reads_a_folder_as_prepare_does(here, shipped, capsys):
+    (here / "mine").mkdir()
+    for i in range(10):
+        walk = datasets.gaits.make(seconds=2.5, speed=1 + i / 10, seed=i)
+        motionlab.write_bvh(walk, here / "mine" / f"{i}.bvh", units="m", up="z")
+    command = ["evaluate", str(shipped), "--data", "mine", *QUICK]
+    assert main([*command, "--units", "m", "--up", "z"]) == 0
+    assert "nats a frame" in capsys.readouterr().out
+    assert main([*command[:2], "--data", "gaits", "--up", "z"]) == 1
+    assert "how its files are read is known; leave out up" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from ..errors import MotionFileError
 from ..io import write_bvh, write_gltf
 from ..io.bvh_reading import Reading
 from ..io.motion_file import ENDINGS, is_motion, read_motion
+from ..io.readings import Readings
 from ..motion import Motion
 from .folder import Files
 
@@ -49,7 +50,7 @@ class Clips(Files):
         """The motion in a file, and what is doubtful about it."""
         return read_motion(file, how)
 
-    def meet(self, files: list[Path], how: Reading) -> None:
+    def meet(self, files: list[Path], how: Readings) -> None:
         """Look at all files before anything is done to the first."""
 
     def work(
@@ -66,14 +67,16 @@ class Clips(Files):
         """
         how = self.how(fps=self.file_fps, tpose_first=self.tpose_first, drop_zeros=self.drop_zeros)
         pairs = self._pairs(suffix, known)
-        self.meet([file for file, _ in pairs], how)
+        files = [file for file, _ in pairs]
+        readings = Readings(self.path, files, how, self.answers())
+        self.meet(files, readings)
         report = Report(self.path, len(pairs))
         unseen = None if self.path.is_dir() else True  # None: where nobody looks
         with tqdm(total=len(pairs), unit="file", leave=False, disable=unseen) as bar:
             for file, target in pairs:
                 with report.of(file, file.stem):
                     self._check_target(file, target, [other for _, other in pairs])
-                    motion, said = self.read(file, how)
+                    motion, said = self.read(file, readings.of(file))
                     report.doubt(file, said)
                     tqdm.write(f"{target}: {self._done(do, motion, file, target)}")
                 bar.update()
@@ -164,6 +167,8 @@ def write(motion: Motion, path: Path, root_motion: str | None = None) -> None:
 
 def as_options(text: str) -> str:
     """What is said of arguments, as ``up='z'``, in the words of the command line: ``--up=z``."""
-    text = re.sub(r"\b(units|up|root|rigid)='([^']*)'", r"--\1=\2", text)
+    text = re.sub(r"\b(units|up|root|rigid|animation)='([^']*)'", r"--\1=\2", text)
+    text = re.sub(r"\bby_file=", "--by-file", text)
+    text = re.sub(r"(?<![-\w])animation=", "--animation=", text)
     text = re.sub(r"(?<![-\w])fps=", "--file-fps=", text)
     return re.sub(r"(?<![-\w])skeleton=", "--skeleton=", text)

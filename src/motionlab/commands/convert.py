@@ -13,11 +13,12 @@ from ..errors import MotionLabError
 from ..io import acclaim
 from ..io.bvh_reading import Reading
 from ..io.bvh_units import is_positive
+from ..io.readings import Readings
 from ..io.root_motion import KINDS
 from ..motion import Motion
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
-from .clips import WRITERS, Clips, as_options, write
+from .clips import WRITERS, Clips, as_options, files_of, write
 from .rig import CANONICAL, Rig, brought_onto
 
 MOST_FPS = 1000  # no one plays more; a slip of the finger would fill the memory
@@ -51,8 +52,13 @@ class Written(Clips):
         motion, said = self.change(motion, file)
         if self.fps is not None:
             motion = motion.resample(self.fps)
-        write(motion, target, self.root_motion)
+        said += self._put(motion, target)
         return "; ".join([_sizes(before, motion), *said, *_about_root(self.root_motion)])
+
+    def _put(self, motion: Motion, target: Path) -> list[str]:
+        """Write it, and what to say of how."""
+        write(motion, target, self.root_motion)
+        return []
 
 
 @dataclass(kw_only=True)
@@ -67,7 +73,7 @@ class Brought(Written, Rig):
         """The rig's file, "canonical", or None for the clips' own."""
         raise NotImplementedError
 
-    def meet(self, files: list[Path], how: Reading) -> None:
+    def meet(self, files: list[Path], how: Readings) -> None:
         """Learn how the clips' rigs stand, once for all clips of one rig."""
         self._stances: dict[Path, Motion | None] = {}
         name = self.onto_name()
@@ -76,21 +82,19 @@ class Brought(Written, Rig):
         self._rig = self.find_rig(name)
         reference = None
         if self.reference is not None:
-            reference, _ = self.read(self.reference, replace(how, tpose_first=False))
+            its = replace(how.of(self.reference), tpose_first=False)
+            reference, _ = self.read(self.reference, its)
         seen = {}
         for file in files:
             with contextlib.suppress(MotionLabError):  # it is told when its turn comes
-                seen[file] = self.read(file, how)[0]
+                seen[file] = self.read(file, how.of(file))[0]
         stood = stances(list(seen.values()), Skeleton.canonical(), reference)
         self._stances = dict(zip(seen, stood.references, strict=True))
         for said in stood.said:
             print(f"note: {self.path}: {as_options(said)}")
 
-    def _write_one(self, motion: Motion, file: Path, target: Path) -> str:
-        line = super()._write_one(motion, file, target)
-        if target.suffix.lower() == ".bvh" and (self.rig_units, self.rig_up) != (None, None):
-            line += "; unlike the rig's file, y up and in centimetres"
-        return line
+    def _put(self, motion: Motion, target: Path) -> list[str]:
+        return self.write(motion, target, self.root_motion)
 
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
         if self.onto_name() is None:
@@ -103,28 +107,27 @@ class Convert(Brought):
     """Motion files into others: BVH for most programs, GLB for Blender, engines and browsers."""
 
     skeleton: Annotated[str | None, arg(metavar="RIG|canonical")] = None
-    """Bring the motion to this rig, as `retarget` does; the files' own if left out. An .asf file is
-    the skeleton by which .amc files are read; if left out, it is looked for beside them."""
+    """Bring the motion to this rig, as `retarget` does; the files' own if left out. Where .amc files
+    are read, an .asf file is what they are read by; if left out, it is looked for beside them."""
+    rig_axes: bool = False
+    """Write BVH as the rig's own BVH file is, as `retarget` does: its unit, axis up, joints, offsets
+    and channels; without, y up and in centimetres, as all that `convert` writes."""
 
     def onto_name(self) -> str | None:
-        return None if self._asf else self.skeleton
-
-    def meet(self, files: list[Path], how: Reading) -> None:
-        if self._asf and not any(file.suffix.lower() == ".amc" for file in files):
-            raise MotionLabError(
-                f"--skeleton {self.skeleton}: is a skeleton of .amc files, and {self.path} is or holds "
-                "none; leave it out, or name a file of motion to bring the clips to its rig."
-            )
-        super().meet(files, how)
+        return None if self._moves_amc else self.skeleton
 
     def read(self, file: Path, how: Reading) -> tuple[Motion, dict[str, str]]:
-        if self._asf and file.suffix.lower() == ".amc":
+        if self._moves_amc and file.suffix.lower() == ".amc":
             return acclaim.read(file, how, skeleton=self.skeleton)
         return super().read(file, how)
 
     @property
-    def _asf(self) -> bool:
-        return self.skeleton is not None and Path(self.skeleton).suffix.lower() == ".asf"
+    def _moves_amc(self) -> bool:
+        """Whether the skeleton is one by which files are read, and no rig to bring them to."""
+        if self.skeleton is None or Path(self.skeleton).suffix.lower() != ".asf":
+            return False
+        files = files_of(self.path) if self.path.is_dir() else [self.path]
+        return any(file.suffix.lower() == ".amc" for file in files)
 
 
 @dataclass(kw_only=True)

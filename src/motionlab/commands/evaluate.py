@@ -6,13 +6,14 @@ import json
 import platform
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from ..errors import TrainingError
+from .folder import Folder
 from .sample import check_generates, check_seed, check_writable, given
 
 
@@ -23,7 +24,7 @@ class Evaluate:
     model: Positional[Annotated[str, arg(metavar="NAME|WEIGHTS")]]
     """Shipped weights, such as lstm-gmm, or a file of your own."""
     data: Annotated[str, arg(metavar="NAME|FOLDER|FILE")] = "locomotion"
-    """Data set, folder of BVH files, or what `prepare` wrote."""
+    """Data set, folder of motion files, or what `prepare` wrote."""
     split: Literal["val", "test"] = "val"
     """Clips to compare with; choose by val, report test once."""
     starts: int = 20
@@ -42,6 +43,7 @@ class Evaluate:
     """Start of all chance."""
     out: Path | None = None
     """File for the numbers, as JSON."""
+    folder: OmitArgPrefixes[Folder] = field(default_factory=Folder)
 
     def run(self) -> None:
         from ..training import Prepared
@@ -57,7 +59,7 @@ class Evaluate:
         model = load(self.model)
         check_generates(model, self.model)
         sampling = model.sampling | given(self, model)
-        data = Prepared.find(self.data)
+        data = Prepared.find(self.data, **self.folder.reading())
         found = evaluate(
             model, data, self.split, starts=self.starts, seconds=self.seconds, seed=self.seed,
             **sampling,

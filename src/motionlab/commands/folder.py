@@ -8,12 +8,13 @@ from pathlib import Path
 from .. import roles
 from ..errors import MotionLabError
 from ..io.bvh_reading import Reading
+from ..io.readings import read_by_file
 from ..io.root_motion import KINDS
 
 
 @dataclass
 class Files:
-    """How files are read; all of a folder alike."""
+    """How files are read; all of a folder alike, but for --by-file."""
 
     units: float | str | None = None
     """Their unit: m, dm, cm, mm, in, ft, or metres per unit; cm for BVH if left out, m for glTF."""
@@ -28,6 +29,9 @@ class Files:
     """mean: put joints that slide against their parents at their mean offset; refused if left out."""
     roles: Path | None = None
     """TOML or JSON file that says which joint is which, as `info` prints it."""
+    by_file: Path | None = None
+    """TOML or JSON file of what is said of some files only: tables by pattern, as ["lab/*"], with
+    units, up, fps, root, rigid, animation, roles, tpose_first, drop_zeros."""
 
     def how(self, **more) -> Reading:
         """What was chosen, checked; raises MotionLabError."""
@@ -38,13 +42,18 @@ class Files:
             )
         known = None if self.roles is None else roles.read(self.roles)
         return Reading(
-            units=self.units, up=self.up, roles=known, root=self.root, rigid=self.rigid, **more
-        )
+            units=self.units, up=self.up, roles=known, root=self.root, rigid=self.rigid,
+            animation=self.animation, **more,
+        )  # fmt: skip
+
+    def answers(self) -> dict[str, dict] | None:
+        """What is said of some files only."""
+        return None if self.by_file is None else read_by_file(self.by_file)
 
 
 @dataclass
 class Folder(Files):
-    """Of a folder's files, as `motionlab prepare` and `motionlab train` ask; all are read alike."""
+    """Of a folder's files, as `motionlab prepare`, `train` and `evaluate` ask."""
 
     fps: float | None = None
     """Frames per second, if their own frame time is wrong."""
@@ -64,4 +73,6 @@ class Folder(Files):
         chosen = {name: value for name, value in vars(self).items() if not left_out(value)}
         if self.roles is not None:
             chosen["roles"] = roles.read(self.roles)
+        if self.by_file is not None:
+            chosen["by_file"] = self.answers()
         return chosen

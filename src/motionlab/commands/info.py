@@ -4,47 +4,36 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from ..datasets.report import Report
 from ..errors import MotionFileError, MotionLabError
 from ..io.bvh_reading import Reading
 from ..io.bvh_units import foot_to_head
 from ..io.motion_file import ENDINGS, is_motion, read_motion
-from ..roles import ALL, read
+from ..io.readings import ByFile, Readings
+from ..roles import ALL
+from .folder import Files
 
 if TYPE_CHECKING:
     from ..motion import Motion
     from ..skeleton import Skeleton
 
 
-@dataclass
-class Info:
+@dataclass(kw_only=True)
+class Info(Files):
     """What is in a motion file and which joint is understood as what; a line a file for a folder."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
     """A .bvh, .amc, .glb or .gltf file, or a folder of them."""
-    roles: Annotated[Path | None, arg(metavar="TABLE")] = None
-    """TOML or JSON file that says which joint is which, as this command prints it."""
-    units: float | str | None = None
-    """The file's unit: m, dm, cm, mm, in, ft, or metres per unit; if not said, cm for BVH, m for glTF."""
-    up: str | None = None
-    """The file's axis that points up: y, z, x, or with a minus, as --up=-z."""
-    root: str | None = None
-    """Name of the ROOT, or node, to begin with, of a file that holds several bodies."""
-    rigid: str | None = None
-    """mean: put joints that slide against their parents at their mean offset."""
-    animation: str | None = None
-    """Name or number of the animation to read, of a glTF file that holds several."""
 
     def run(self) -> None:
-        given = None if self.roles is None else read(self.roles)
-        names = ("units", "up", "root", "rigid", "animation")
-        print(describe(self.path, roles=given, **{name: getattr(self, name) for name in names}))
+        print(_described(self.path, self.how(), self.answers()))
 
 
 def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None, **reading) -> str:
@@ -64,31 +53,34 @@ def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None,
     ------
     MotionFileError : the file can't be read, `roles` do not fit it, or a folder has no motion file.
     """
-    path = Path(path)
+    by_file = reading.pop("by_file", None)
+    return _described(Path(path), Reading(roles=roles, **reading), by_file)
+
+
+def _described(path: Path, how: Reading, by_file: ByFile | None) -> str:
     if not path.is_dir():
-        motion, doubts = _read(path, roles, reading)
-        return "\n".join([*_sizes(motion, doubts), "#", *_table(motion.skeleton)])
+        motion, doubts = read_motion(path, Readings(path, [path], how, by_file).of(path))
+        return "\n".join([*_sizes(motion, doubts.values()), "#", *_table(motion.skeleton)])
     files = sorted(file for file in path.rglob("*") if is_motion(file))
     if not files:
         raise MotionFileError(f"{path}: holds no {ENDINGS} file; name one, or a folder of them.")
-    return "\n".join(_line(file, file.relative_to(path), roles, reading) for file in files)
+    report, readings = Report(path, len(files)), Readings(path, files, how, by_file)
+    lines = [_line(file, readings.of(file), report) for file in files]
+    return "\n".join([*lines, *report.fitting()])
 
 
-def _read(path: Path, roles: Mapping[str, str] | None, reading: dict) -> tuple[Motion, list[str]]:
-    """A motion, and what reading it warned of."""
-    motion, doubts = read_motion(path, Reading(roles=roles, **reading))
-    return motion, list(doubts.values())
-
-
-def _line(file: Path, name: Path, roles: Mapping[str, str] | None, reading: dict) -> str:
+def _line(file: Path, how: Reading, report: Report) -> str:
     """One file of a folder in one line."""
+    name = file.relative_to(report.folder)
     try:
-        motion, doubts = _read(file, roles, reading)
+        motion, doubts = read_motion(file, how)
     except MotionLabError as error:
         return f"{name}: FAULT {error}"
+    report.doubt(file, doubts)
     missing = _missing(motion.skeleton)
     said = f"lacks {', '.join(missing)}" if missing else "has all roles that retargeting needs"
-    return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", said, *doubts])
+    doubtful = [doubt.rstrip(".") for doubt in doubts.values()]
+    return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", *doubtful, said])
 
 
 def _counts(motion: Motion) -> str:
@@ -113,7 +105,7 @@ def _missing(skeleton: Skeleton) -> list[str]:
     return [role for role in NEEDED if role not in skeleton.roles]
 
 
-def _sizes(motion: Motion, doubts: list[str]) -> list[str]:
+def _sizes(motion: Motion, doubts: Iterable[str]) -> list[str]:
     found = [f"{motion.name}: {_counts(motion)}, {_size(motion)}", *doubts]
     return [f"# {' '.join(line.split())}" for line in found]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..io.bvh_reading import Doubts, Reading
 from ..motion import Motion
-from .clips import Clips
+from .clips import Clips, as_options
 
 
 @dataclass(kw_only=True)
@@ -27,6 +28,10 @@ class Look(Clips):
             self.out = Path(f"{name.name}_pages" if folder else f"{name.stem}.html")
         self.work(".html", self._page, (".html",))
 
+    def read(self, file: Path, how: Reading) -> tuple[Motion, Doubts]:
+        motion, self._doubts = super().read(file, how)
+        return motion, self._doubts
+
     def _page(self, motion: Motion, _: Path, target: Path) -> str:
         import webbrowser
 
@@ -38,7 +43,9 @@ class Look(Clips):
             f"{motion.skeleton.joints} joints, {len(motion)} frames, {motion.seconds:.2f} s, "
             f"{motion.fps:g} fps"
         )
-        page = whole_page(show(motion, height=self.height, page=True), motion.name, about)
+        figure = show(motion, height=self.height, page=True)
+        notes = [as_options(said) for said in self._doubts.values()]
+        page = whole_page(figure, motion.name, about, notes)
         write_whole(target, lambda stream: stream.write(page.encode()))
         if self.open:
             webbrowser.open(target.resolve().as_uri())

@@ -1,19 +1,21 @@
-"""The rig that a command brings motion to, and what is said of that."""
+"""The rig that a command brings motion to, how that is written, and what is said of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import torch
 
-from ..errors import MotionLabError, RetargetError
+from ..errors import MotionFileError, MotionLabError, RetargetError
+from ..io import write_bvh
 from ..io.bvh_units import foot_to_head
-from ..io.motion_file import read_motion
+from ..io.motion_file import is_bvh, read_rig
 from ..motion import Motion
 from ..retargeting.onto_rig import onto_rig
 from ..skeleton import Skeleton
-from .clips import as_options
+from .clips import as_options, write
 from .folder import Files
 
 CANONICAL = "canonical"
@@ -21,30 +23,63 @@ CANONICAL = "canonical"
 
 @dataclass(kw_only=True)
 class Rig:
-    """How the file of a rig is read, that motion is brought to."""
+    """How the file of a rig is read, that motion is brought to, and whether it is written so, too."""
 
     rig_units: float | str | None = None
     """The rig's unit, as --units."""
     rig_up: str | None = None
     """The rig's axis up, as --up."""
+    rig_root: str | None = None
+    """The rig's ROOT or node to begin with, as --root."""
+    rig_animation: str | None = None
+    """The rig's animation, as --animation."""
+    rig_rigid: str | None = None
+    """What becomes of the rig's joints that slide, as --rigid."""
     rig_roles: Path | None = None
     """The rig's table of joints, as --roles."""
+    rig_axes: bool = True
+    """Write BVH as the rig's own BVH file is: its unit, axis up, joints, offsets and channels;
+    --no-rig-axes: y up and in centimetres."""
+
+    _like: ClassVar[Path | None] = None  # the rig's file, if it is one of BVH
 
     def find_rig(self, name: str) -> Motion | None:
         """The rig in a file; None for the canonical body. Prints what is doubtful about it."""
         if name == CANONICAL:
             return None
-        how = Files(units=self.rig_units, up=self.rig_up, roles=self.rig_roles).how()
-        rig, doubts = read_motion(Path(name), how)
-        doubts.pop("rate", None)  # how fast it moves is not asked
-        for said in doubts.values():
-            print(f"note: {name}: {_of_the_rig(said)}", flush=True)
+        how = Files(
+            units=self.rig_units, up=self.rig_up, roles=self.rig_roles, root=self.rig_root,
+            animation=self.rig_animation, rigid=self.rig_rigid,
+        ).how()  # fmt: skip
+        try:
+            rig, doubts = read_rig(Path(name), how)
+        except MotionFileError as error:
+            raise MotionFileError(_of_the_rig(str(error))) from error
+        if is_bvh(name):
+            self._like = Path(name)
         body = Skeleton.canonical()
         try:  # before any clip is tried
             onto_rig(Motion(body, torch.zeros(1, 3), torch.eye(3).repeat(1, 21, 1, 1), 30), rig)
         except MotionLabError as error:
-            raise RetargetError(f"{name}: {_of_the_rig(str(error))}") from error
+            first = [doubts[about] for about in ("units", "up") if about in doubts]
+            said = " As it is now: ".join([*first, str(error)])  # it may be no more than that
+            raise RetargetError(f"{name}: {_of_the_rig(said)}") from error
+        doubts.pop("rate", None)  # how fast it moves is not asked
+        for said in doubts.values():
+            print(f"note: {name}: {_of_the_rig(said)}", flush=True)
         return rig
+
+    def write(self, motion: Motion, path: Path, root_motion: str | None = None) -> list[str]:
+        """Write a motion that was brought to the rig, and what to say of its axes and unit."""
+        units, up = self.rig_units or "cm", self.rig_up or "y"
+        if self._like is None or path.suffix.lower() != ".bvh":
+            write(motion, path, root_motion)
+            return []
+        if self.rig_axes:
+            write_bvh(motion, path, units=units, up=up, like=self._like, root_motion=root_motion)
+            return [f"as the rig's file is: {up} up, units {units}"]
+        write(motion, path, root_motion)
+        return ["unlike the rig's file, y up and in centimetres"] * ((units, up) != ("cm", "y"))
 
 
 def _of_the_rig(text: str) -> str:

@@ -14,7 +14,7 @@ from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, TrainingError
 from ..io.root_motion import KINDS
-from .clips import WRITERS, write
+from .clips import WRITERS
 from .rig import Rig, brought_onto
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Sample(Rig):
             said = []
             if self.skeleton is not None:
                 motion, said = brought_onto(motion, rig)
-            write(motion, path, self.root_motion)
+            said += self.write(motion, path, self.root_motion)
             about = f"{motion.seconds:.1f} s from {model.start_names[start]!r}"
             print(f"{path}: {'; '.join([about, *said])}")
 

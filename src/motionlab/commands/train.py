@@ -28,7 +28,7 @@ class Train:
     preset: Literal["smoke", "table", "ship", "paper"] = "table"
     """How long and how large; see motionlab.training.presets, and games for refiners."""
     data: Annotated[str | None, arg(metavar="NAME|FOLDER|FILE")] = None
-    """Data set, folder of BVH files, or what `prepare` wrote; locomotion or the style if left out."""
+    """Data set, folder of motion files, or what `prepare` wrote; locomotion or the style if left out."""
     start: Annotated[str | None, arg(name="from", metavar="NAME|WEIGHTS")] = None
     """Weights to begin with, for fine-tuning; of a refiner: the generator that it is to refine."""
     out: Path | None = None

@@ -18,6 +18,7 @@ from ..io.acclaim import parse_amc
 from ..io.bvh import parse_bvh
 from ..io.bvh_reading import Reading
 from ..io.motion_file import ENDINGS, is_motion, read_motion
+from ..io.readings import ByFile, Readings
 from ..motion import Motion
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
@@ -195,6 +196,7 @@ def from_folder(
     rigid: str | None = None,
     roles: Mapping[str, str] | None = None,
     animation: str | int | None = None,
+    by_file: ByFile | None = None,
     pattern: str | None = None,
     tpose_first: bool = False,
     drop_zeros: bool = False,
@@ -212,6 +214,8 @@ def from_folder(
         `motionlab.read_bvh`, `read_amc` and `read_gltf`, for all files alike; units None is
         centimetres for BVH, metres for glTF, for Acclaim what its skeleton says. What is doubtful
         about files, such as their units, is said once, with their number.
+    by_file : the same arguments for some files only, by a pattern of their paths below the folder, as
+        ``{"lab/*": {"units": "m", "up": "z"}}``.
     pattern : which files, as for `pathlib.Path.glob`; None takes all that end in .bvh, .amc, .glb
         or .gltf.
     split : only the files of this split; which are in it depends on the files' names alone.
@@ -235,7 +239,7 @@ def from_folder(
     found = read_folder(
         path, pattern=pattern, split=split, skip_bad=skip_bad, skeleton=skeleton,
         reference=reference, units=units, up=up, fps=fps, root=root, rigid=rigid, roles=roles,
-        animation=animation, tpose_first=tpose_first, drop_zeros=drop_zeros,
+        animation=animation, by_file=by_file, tpose_first=tpose_first, drop_zeros=drop_zeros,
     )  # fmt: skip
     return [motion for _, motion in found]
 
@@ -250,6 +254,7 @@ def read_folder(
     skip_bad: bool = False,
     skeleton: Skeleton | None = None,
     reference: Motion | str | os.PathLike | None = None,
+    by_file: ByFile | None = None,
     **reading,
 ) -> list[tuple[str, Motion]]:
     """`from_folder`, each clip with its split before it, and with something done to each.
@@ -261,14 +266,16 @@ def read_folder(
     how = Reading(**reading)
     if reference is not None and skeleton is None:
         raise DataError("reference= tells how to retarget; say with skeleton= to which body, too.")
-    stance = _standing(reference, how)
     # what axes a rig has must not depend on the split that is asked for
-    folder, chosen = _find(path, pattern, None if skeleton else split)
+    folder, there = _find(path, pattern)
+    chosen = [row for row in there if skeleton or split in (None, row[2])]
+    readings = Readings(folder, [file for file, *_ in there], how, by_file)
+    stance = _standing(reference, readings)
     report, found = Report(folder, len(chosen)), []
     with _progress(f"reading {folder.name}", len(chosen)) as bar:
         for file, name, its in chosen:
             with report.of(file, name):
-                motion, doubts = read_motion(file, how, folder.resolve().name)
+                motion, doubts = read_motion(file, readings.of(file), folder.resolve().name)
                 report.doubt(file, doubts)
                 found.append((file, its, then(replace(motion, name=name))))
             bar.update()
@@ -278,11 +285,11 @@ def read_folder(
     return [(its, motion) for _, its, motion in found]
 
 
-def _standing(reference: Motion | str | os.PathLike | None, how: Reading) -> Motion | None:
+def _standing(reference: Motion | str | os.PathLike | None, how: Readings) -> Motion | None:
     """The reference, read as the clips are; its first frame is no worse for being a T-pose."""
     if reference is None or isinstance(reference, Motion):
         return reference
-    return read_motion(reference, replace(how, tpose_first=False))[0]
+    return read_motion(reference, replace(how.of(reference), tpose_first=False))[0]
 
 
 def _retargeted(
@@ -305,10 +312,8 @@ def _retargeted(
     return brought
 
 
-def _find(
-    path: str | os.PathLike, pattern: str | None, split: str | None
-) -> tuple[Path, list[tuple[Path, str, str]]]:
-    """The folder, and of each of its files that is of the split: path, name of the clip, split."""
+def _find(path: str | os.PathLike, pattern: str | None) -> tuple[Path, list[tuple[Path, str, str]]]:
+    """The folder, and of each of its files: path, name of the clip, split."""
     if not isinstance(path, str | os.PathLike):
         raise DataError(
             f"from_folder: {path!r} is not a path; give the folder of the motion files."
@@ -340,8 +345,7 @@ def _find(
                 f"them, or give a pattern such as '**/*{other.suffix}'."
             )
     splits = assign([("", name, "", "") for name in names])
-    rows = zip(found, names, splits, strict=True)
-    return folder, [row for row in rows if split in (None, row[2])]
+    return folder, list(zip(found, names, splits, strict=True))
 
 
 def _progress(what: str, total: int) -> tqdm:

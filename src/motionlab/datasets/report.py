@@ -17,7 +17,9 @@ class Report:
         self.folder, self.files = folder, files
         self.said: list[str] = []  # of the folder as a whole
         self.faults: list[str] = []
-        self._doubts: dict[str, list[str]] = {}
+        self._doubts: dict[
+            tuple[str, str], dict[Path, str]
+        ] = {}  # by what it is about, and what fits
 
     @contextmanager
     def of(self, file: Path, name: str) -> Iterator[None]:
@@ -32,7 +34,7 @@ class Report:
             except MotionFileError as error:  # names the file
                 self.faults.append(str(error))
             except MotionLabError as error:
-                self.faults.append(f"{file}: {error}")
+                self.faults.append(f"{file}: {self._first(file)}{error}")
         for warning in told:
             said = str(warning.message)
             self.doubt(file, {said.replace(repr(name), ""): said})
@@ -40,15 +42,41 @@ class Report:
     def doubt(self, file: Path, doubts: dict[str, str]) -> None:
         """Something to be said of a file, by what it is about."""
         for about, said in doubts.items():
-            self._doubts.setdefault(about, []).append(f"{file}: {said}")
+            which = (about, getattr(said, "fits", ""))
+            self._doubts.setdefault(which, {})[file] = f"{file}: {said}"
+
+    def _first(self, file: Path) -> str:
+        """What to do about a file before any fault of its body is worth a look."""
+        fits = [fits for (_, fits), files in self._doubts.items() if fits and file in files]
+        if not fits:
+            return ""
+        return f"looks as if read wrongly; read it with {' and '.join(fits)}. As it is now: "
 
     def notes(self) -> list[str]:
         """All doubts, those about the same in one, with a count."""
-        several = f"{self.folder}, {{}} of {self.files} files, first "
-        notes = [
-            several.format(len(said)) * (len(said) > 1) + said[0] for said in self._doubts.values()
+        notes = []
+        for (_, fits), files in self._doubts.items():
+            note = next(iter(files.values()))
+            if len(files) > 1:
+                note = f"{self.folder}, {len(files)} of {self.files} files, first {note}"
+            if self._some(fits, files):
+                note += f" What looks like {fits}: {self._names(files)}."
+            notes.append(note)
+        return [*notes, *(f"{self.folder}: {said}" for said in self.said)]
+
+    def fitting(self) -> list[str]:
+        """Which files another way of reading fits, where it fits several and not all."""
+        return [
+            f"{self.folder}: {len(files)} of {self.files} files look like {fits}: {self._names(files)}"
+            for (_, fits), files in self._doubts.items()
+            if self._some(fits, files)
         ]
-        return notes + [f"{self.folder}: {said}" for said in self.said]
+
+    def _some(self, fits: str, files: dict[Path, str]) -> bool:
+        return bool(fits) and 1 < len(files) < self.files
+
+    def _names(self, files: dict[Path, str]) -> str:
+        return ", ".join(file.relative_to(self.folder).as_posix() for file in files)
 
     def tell(self, skip_bad: bool, stacklevel: int) -> None:
         """Warn of all doubts, and of the faults if they may be; raise DataError if they may not, or

@@ -10,6 +10,7 @@ import os
 import re
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ import torch
 from ..errors import AmcError, BvhError, SkeletonError
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .acclaim_frames import AcclaimFrames, parse_frames
+from .acclaim_frames import USUAL, AcclaimFrames, parse_frames
 from .acclaim_skeleton import ROOT, AcclaimSkeleton, parse_skeleton
 from .bvh_reading import Doubts, Reading, frames_to_skip
 from .bvh_text import opened
@@ -111,6 +112,16 @@ def read(
     return motion, said | doubts
 
 
+def read_rest(path: str | os.PathLike, how: Reading) -> tuple[Motion, Doubts]:
+    """A skeleton file by itself, as a motion of one frame at rest, and what to warn of."""
+    skeleton = parse_skeleton(opened(path, AmcError), path)
+    still = np.zeros((1, len(skeleton.bones), 3))
+    root = np.array([skeleton.position], dtype=float)
+    orders = ["ZYX"] * len(skeleton.bones)
+    motion, doubts = _made(skeleton, (still, orders, root, USUAL), Path(path), how)
+    return motion, skeleton.doubts | doubts
+
+
 def _reading(**reading) -> Reading:
     try:
         return Reading(**reading)
@@ -154,35 +165,52 @@ def _skeleton_of(path: Path, data: bytes) -> tuple[Path, Doubts]:
 def _parse(
     data: bytes, skeleton: AcclaimSkeleton, where, how: Reading, source: str
 ) -> tuple[Motion, Doubts]:
-    if how.root is not None:
-        raise AmcError(f"{where}: an .amc file holds one body; leave root={how.root!r} out.")
     frames = parse_frames(data, where, skeleton)
     doubts = {**skeleton.doubts, **frames.doubts}
-    rate = frames.rate
     if how.fps is not None:
-        rate = how.fps
         doubts.pop("rate", None)
-    metres = _INCH / skeleton.length if how.units is None else in_metres(how.units)
     angles, orders = _angles(skeleton, frames)
     try:
         skip = frames_to_skip(angles, how, where)
+    except BvhError as error:
+        raise AmcError(str(error)) from error
+    doubts |= _doubt_rigid(skeleton, frames, _metres(skeleton, how), how, where)
+    moves = (angles[skip:], orders, _root(skeleton, frames)[skip:], how.fps or frames.rate)
+    motion, more = _made(skeleton, moves, where, how)
+    return replace(motion, source=source), doubts | more
+
+
+def _made(
+    skeleton: AcclaimSkeleton,
+    moves: tuple[np.ndarray, list[str], np.ndarray, float],
+    where,
+    how: Reading,
+) -> tuple[Motion, Doubts]:
+    """The motion of a skeleton, y up, and what to warn of.
+
+    moves : angles and orders as `_angles` gives them, where the root is, and the rate.
+    """
+    if how.root is not None:
+        raise AmcError(f"{where}: an .amc file holds one body; leave root={how.root!r} out.")
+    metres = _metres(skeleton, how)
+    try:
         body = _body(skeleton, metres, how.roles)
-    except (BvhError, SkeletonError) as error:
-        said = str(error) if isinstance(error, BvhError) else f"{where}: {error}"
-        raise AmcError(said) from error
-    doubts |= _doubt_rigid(skeleton, frames, metres, how, where)
+    except SkeletonError as error:
+        raise AmcError(f"{where}: {error}") from error
+    angles, orders, root, rate = moves
     motion = Motion(
-        body,
-        (_root(skeleton, frames) * metres)[skip:],
-        _rotations(skeleton, angles, orders)[skip:],
-        float(rate),
+        body, root * metres, _rotations(skeleton, angles, orders), float(rate),
         name=Path(where).stem,
-        source=source,
-    )
+    )  # fmt: skip
     motion = turn_up(motion, how.up)
     said = {"units": doubt_units(motion.skeleton, float(f"{metres:.6g}"))}
     said["up"] = doubt_up(motion, how.up)
-    return motion, doubts | {about: text for about, text in said.items() if text}
+    return motion, {about: text for about, text in said.items() if text}
+
+
+def _metres(skeleton: AcclaimSkeleton, how: Reading) -> float:
+    """Metres in the file's unit."""
+    return _INCH / skeleton.length if how.units is None else in_metres(how.units)
 
 
 def _angles(skeleton: AcclaimSkeleton, frames: AcclaimFrames) -> tuple[np.ndarray, list[str]]:

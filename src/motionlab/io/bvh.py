@@ -24,8 +24,10 @@ from ..errors import BvhError
 from ..kinematics import heading
 from ..motion import Motion
 from ..skeleton import Skeleton
+from .bvh_like import Header
 from .bvh_reading import Doubts, Reading, parse, read
 from .bvh_units import in_metres
+from .bvh_up import check_up, turn_back, turned_back, vertical
 from .euler import to_euler
 from .root_motion import Parts, check_kind, root_name
 from .root_motion import split as split_root
@@ -101,6 +103,8 @@ def write_bvh(
     path: str | os.PathLike,
     *,
     units: str | float = "cm",
+    up: str | None = None,
+    like: str | os.PathLike | None = None,
     overwrite: bool = True,
     root_motion: str | None = None,
 ) -> None:
@@ -110,13 +114,18 @@ def write_bvh(
 
     Parameters
     ----------
+    units, up : of the file, as for `read_bvh`: with the same ones it is read as the same motion.
+    like : a BVH file of the motion's rig, in these units and with this axis up: its joints, offsets and
+        channels are kept to the letter, so that programs that know it take this one as its motion.
+        Channels are added where the motion needs them; what is no joint of the motion, such as a
+        root above the body, stands still.
     root_motion : "in-place" leaves way and heading out; "ground" puts them on a root joint on the
         floor, in whose frame the body moves, by position channels (`motionlab.io.root_motion`).
         `read_bvh` folds such a root into the body again.
 
     Raises
     ------
-    BvhError : the motion has no frames, or the path can't be written.
+    BvhError : the motion has no frames, the path can't be written, or `like` is of another rig.
     MotionError : there is no such root motion.
     """
     if not isinstance(motion, Motion) or not isinstance(path, str | os.PathLike):
@@ -139,25 +148,21 @@ def write_bvh(
             "the same name; rename one of them."
         )
     check_kind(root_motion)
+    check_up(up)
     parts = None if root_motion is None else split_root(motion)
     motion = motion if parts is None else parts.body
-    order = _depth_first(motion.skeleton.parents)
-    root_positions, rotations = motion.numpy()
-    angles = to_euler(rotations, motion.skeleton.rotation_orders)
-    clip = pybvh.Bvh(
-        nodes=_nodes(motion.skeleton, order, scale),
-        root_pos=root_positions.astype(np.float64) * scale,
-        joint_angles=angles[:, order],
-        frame_time=1 / motion.fps,
-        world_up="+y",
-    )
+    header = None if like is None else Header.of(like, units, motion)
+    motion = turn_back(motion, up, None if header is None else header.skeleton)
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".bvh-") as folder:
             whole = Path(folder) / "clip.bvh"
-            pybvh.write_bvh_file(clip, whole)
-            _restore_names(whole, names)
+            if header is None:
+                pybvh.write_bvh_file(_clip(motion, scale), whole)
+                _restore_names(whole, names)
+            else:
+                whole.write_text(header.text(motion, scale), encoding="utf-8")
             if root_motion == "ground":
-                _put_on_root(whole, root_name(names), parts, scale)
+                _put_on_root(whole, root_name(names), parts, scale, up)
             os.replace(whole, path)
     except OSError as error:
         raise BvhError(
@@ -167,6 +172,20 @@ def write_bvh(
         raise BvhError(
             f"{path}: joints are nested too deeply for pybvh to write; shorten the chain."
         ) from error
+
+
+def _clip(motion: Motion, scale: float) -> pybvh.Bvh:
+    """pybvh's clip; scale : units in a metre."""
+    order = _depth_first(motion.skeleton.parents)
+    root_positions, rotations = motion.numpy()
+    angles = to_euler(rotations, motion.skeleton.rotation_orders)
+    return pybvh.Bvh(
+        nodes=_nodes(motion.skeleton, order, scale),
+        root_pos=root_positions.astype(np.float64) * scale,
+        joint_angles=angles[:, order],
+        frame_time=1 / motion.fps,
+        world_up="+y",
+    )
 
 
 def _depth_first(parents: Sequence[int]) -> list[int]:
@@ -220,17 +239,20 @@ def _restore_names(file: Path, names: Sequence[str]) -> None:
     file.write_text(header + motion + rows, encoding="utf-8")
 
 
-def _put_on_root(file: Path, name: str, parts: Parts, scale: float) -> None:
+def _put_on_root(file: Path, name: str, parts: Parts, scale: float, up: str | None) -> None:
     """Hang the body of a file that has been written on a root joint that carries way and heading."""
     head, _, rows = file.read_text(encoding="utf-8").partition("MOTION\n")
     _, _, body = head.partition("ROOT ")
-    channels = "Xposition Yposition Zposition Yrotation Xrotation Zrotation"
+    axis, sign = vertical(up)
+    turning = "XYZ"[axis] + "XYZ".replace("XYZ"[axis], "")
+    channels = " ".join([*(f"{x}position" for x in "XYZ"), *(f"{x}rotation" for x in turning)])
     head = (
         f"HIERARCHY\nROOT {name}\n{{\n\tOFFSET 0.0 0.0 0.0\n\tCHANNELS 6 {channels}\n"
         + textwrap.indent(f"JOINT {body}", "\t")
         + "}\n"
     )
-    way, yaw = parts.way.double() * scale, torch.rad2deg(heading(parts.turn)).double()
+    way = turned_back(parts.way, up).double() * scale
+    yaw = sign * torch.rad2deg(heading(parts.turn)).double()
     frames, time, *rows = rows.splitlines()
     moved = [
         f"{x:.6f} {y:.6f} {z:.6f} {angle:.6f} 0.000000 0.000000 {row}"

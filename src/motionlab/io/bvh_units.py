@@ -19,6 +19,17 @@ SPANS = (0.1, 10.0)
 _USUAL_SPAN = 2.0
 
 
+class Doubt(str):
+    """What is doubtful about how a file was read, and the argument that fits, as "units='m'"."""
+
+    fits: str
+
+    def __new__(cls, said: str, fits: str) -> Doubt:
+        doubt = super().__new__(cls, said)
+        doubt.fits = fits
+        return doubt
+
+
 def in_metres(units: str | float) -> float:
     """Metres per unit."""
     metres = UNITS.get(units) if isinstance(units, str) else units
@@ -37,7 +48,7 @@ def is_positive(value) -> bool:
         return False
 
 
-def doubt_units(skeleton: Skeleton, units: str | float) -> str | None:
+def doubt_units(skeleton: Skeleton, units: str | float) -> Doubt | str | None:
     """What to say if the body is not of the size of a person, read in these units.
 
     Where some of its joints are known, but foot or head is not, only what can be no body is told.
@@ -55,12 +66,12 @@ def doubt_units(skeleton: Skeleton, units: str | float) -> str | None:
         return f"{said}; its bones have no length, export it with its offsets."
     best = min(UNITS, key=lambda unit: abs(math.log(raw * UNITS[unit] / usual)))
     if least <= raw * UNITS[best] <= most:
-        better = f"units={best!r} makes it {raw * UNITS[best]:.2f} m"
+        fits = f"units={best!r}"
+        better = f"{fits} makes it {raw * UNITS[best]:.2f} m"
     else:
-        better = (
-            f"of {', '.join(UNITS)} none fits, metres per unit do, about units={usual / raw:.2g}"
-        )
-    return f"{said}, as no person does; pass another unit: {better}."
+        fits = f"units={usual / raw:.2g}"
+        better = f"of {', '.join(UNITS)} none fits, metres per unit do, about {fits}"
+    return Doubt(f"{said}, as no person does; pass another unit: {better}.", fits)
 
 
 def foot_to_head(skeleton: Skeleton) -> float | None:

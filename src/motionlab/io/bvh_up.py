@@ -1,4 +1,5 @@
-"""Which axis of a BVH file points up: motion turned so that y does, and files that do not say so."""
+"""Which axis of a BVH file points up: motion turned so that y does, and back, and files that do not
+say so."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from torch import Tensor
 from ..errors import BvhError
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .bvh_units import ancestors
+from .bvh_units import Doubt, ancestors
 
 # What x, y and z become where the named axis of the file points up: turned about the file's x, and
 # where that is up itself, about its z. "-y" is the half turn from a camera's axes, whose y is down.
@@ -48,29 +49,56 @@ def turn_up(motion: Motion, up: str | None) -> Motion:
     if up in (None, "y"):
         return motion
     turn = torch.tensor(_TURNS[up], dtype=torch.float32)
+    if _rests_upright(motion.skeleton):
+        return _turned(motion, turn, motion.skeleton)
+    return _turned(motion, turn, _turned_skeleton(motion.skeleton, turn))
+
+
+def turn_back(motion: Motion, up: str | None, drawn: Skeleton | None = None) -> Motion:
+    """The inverse of `turn_up`: a motion with y up in the axes of a file whose axis `up` points up.
+
+    drawn : its skeleton as the file has it; None is one whose rest pose is turned as the world is.
+    """
+    turn = torch.tensor(_TURNS[up or "y"], dtype=torch.float32).T
+    if drawn is not None and _rests_upright(drawn):
+        return replace(_turned(motion, turn, motion.skeleton), skeleton=drawn)
+    return _turned(motion, turn, drawn or _turned_skeleton(motion.skeleton, turn))
+
+
+def turned_back(points: Tensor, up: str | None) -> Tensor:
+    """Points (..., 3) with y up in the axes of a file whose axis `up` points up."""
+    return points @ torch.tensor(_TURNS[up or "y"], dtype=torch.float32)
+
+
+def vertical(up: str | None) -> tuple[int, float]:
+    """Which axis of a file points up, 0 to 2, and 1, or -1 if it points down."""
+    up = up or "y"
+    return "xyz".index(up[-1]), -1.0 if up[0] == "-" else 1.0
+
+
+def _turned(motion: Motion, turn: Tensor, skeleton: Skeleton) -> Motion:
+    """The motion in a world turned by (3, 3), its rest pose, too, if it gets another skeleton."""
     rotations = motion.rotations.clone()
-    skeleton = motion.skeleton
     rotations[:, 0] = turn @ rotations[:, 0]
-    if not _rests_upright(skeleton):
+    if skeleton is not motion.skeleton:
         rotations = rotations @ turn.T
         rotations[:, 1:] = turn @ rotations[:, 1:]
-        becomes = {"XYZ"[old]: "XYZ"[new] for new, old in enumerate(turn.abs().argmax(1).tolist())}
-        orders = ("".join(becomes[axis] for axis in order) for order in skeleton.rotation_orders)
-        skeleton = replace(
-            skeleton,
-            offsets=skeleton.offsets @ turn.T,
-            end_offsets=skeleton.end_offsets @ turn.T,
-            rotation_orders=tuple(orders),
-        )
+    root = motion.root_positions @ turn.T
+    return replace(motion, skeleton=skeleton, root_positions=root, rotations=rotations)
+
+
+def _turned_skeleton(skeleton: Skeleton, turn: Tensor) -> Skeleton:
+    becomes = {"XYZ"[old]: "XYZ"[new] for new, old in enumerate(turn.abs().argmax(1).tolist())}
+    orders = ("".join(becomes[axis] for axis in order) for order in skeleton.rotation_orders)
     return replace(
-        motion,
-        skeleton=skeleton,
-        root_positions=motion.root_positions @ turn.T,
-        rotations=rotations,
+        skeleton,
+        offsets=skeleton.offsets @ turn.T,
+        end_offsets=skeleton.end_offsets @ turn.T,
+        rotation_orders=tuple(orders),
     )
 
 
-def doubt_up(motion: Motion, up: str | None = None) -> str | None:
+def doubt_up(motion: Motion, up: str | None = None) -> Doubt | None:
     """What to say if the trunk, as far as the joints' roles tell it, is hardly ever upright.
 
     motion : turned; up : the file's axis that was said to point up. "y" is how to say that a person
@@ -90,15 +118,17 @@ def doubt_up(motion: Motion, up: str | None = None) -> str | None:
     if up is not None:
         if (sign * trunk[:, axis] > _UPRIGHT).float().mean() < _MOST:
             return None
-        return (
+        return Doubt(
             f"read with up={up!r} the body's trunk is upright in hardly any frame; it points along the "
             f"file's {name}: if that is up, read it with up={name!r}. Of a person who lies, crawls or "
-            "stands on the hands it may be right."
+            "stands on the hands it may be right.",
+            f"up={name!r}",
         )
-    return (
+    return Doubt(
         f"the body's trunk points along {name} and is upright (along y) in hardly any frame; if "
         f"{name} is up in this file, read it with up={name!r}, if the person lies, crawls or "
-        "stands on the hands, with up='y'."
+        "stands on the hands, with up='y'.",
+        f"up={name!r}",
     )
 
 

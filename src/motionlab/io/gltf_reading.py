@@ -56,8 +56,9 @@ def parse(
     motion = turn_up(_named(motion, how, where, source), how.up)  # which asks where the trunk is
     doubts |= body.tree.doubts
     doubts["units"] = doubt_units(motion.skeleton, units)
-    if how.up is None and doubt_up(body.motion(body.still, np.zeros(1), fps, Reading())):
-        doubts["up"] = doubt_up(motion)  # of one who crouches the pose at rest is upright
+    still = turn_up(body.motion(body.still, np.zeros(1), fps, Reading()), how.up)
+    if doubt_up(still, how.up):
+        doubts["up"] = doubt_up(motion, how.up)  # of one who crouches the pose at rest is upright
     return motion, {about: said for about, said in doubts.items() if said}
 
 

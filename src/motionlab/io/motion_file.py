@@ -38,6 +38,20 @@ def is_motion(path: Path) -> bool:
     return path.suffix.lower() in _READERS
 
 
+def is_bvh(path: str | os.PathLike) -> bool:
+    """Whether a file is read as BVH."""
+    ending = Path(path).suffix.lower()
+    return ending != ".asf" and _READERS.get(ending, bvh_reading.read) is bvh_reading.read
+
+
+def read_rig(path: str | os.PathLike, how: Reading) -> tuple[Motion, Doubts]:
+    """`read_motion` of a file that stands for its rig, which an Acclaim skeleton does by itself: it
+    is read as one frame, at rest."""
+    if Path(path).suffix.lower() == ".asf":
+        return acclaim.read_rest(path, how)
+    return read_motion(path, how)
+
+
 def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tuple[Motion, Doubts]:
     """The motion in a file, and what to warn of; what ends in none of `SUFFIXES` is read as BVH, but
     for formats that are known to be other ones.

@@ -26,6 +26,7 @@ from ..datasets.locomotion import bring
 from ..datasets.splits import LONG, SMALLEST, SPLITS, by_time
 from ..encodings import JointAngles, Normalizer, RootRelative
 from ..errors import DataError, TrainingError
+from ..io.bvh_up import doubt_up
 from ..motion import Motion
 from ..skeleton import Skeleton
 from .checkpoints import write_whole
@@ -256,9 +257,23 @@ def _own(source: str | os.PathLike, permissive: bool, reading: dict) -> list[tup
     found = read_folder(
         source, then=lambda motion: motion.resample(FPS), skeleton=Skeleton.canonical(), **reading
     )
+    if reading.get("up") is not None:  # what nobody said was told while it was read
+        _warn_of_lying(source, [motion for _, motion in found])
     if {"train", "val"} <= {split for split, _ in found}:
         return found
     return _by_time(source, [motion for _, motion in found])
+
+
+def _warn_of_lying(source: str | os.PathLike, motions: list[Motion]) -> None:
+    """A network learns what lies as it learns what walks, so that a wrong `up` must not go unheard."""
+    lying = [motion.name for motion in motions if doubt_up(motion)]
+    if lying:
+        warnings.warn(
+            f"{source}: in {len(lying)} of {len(motions)} clips, read with the up that was said, the "
+            f"trunk is upright in hardly any frame: {', '.join(lying)}. Unless people lie or crawl "
+            "there, another axis is up; a network would learn to lie.",
+            stacklevel=2,
+        )
 
 
 def _by_time(source: str | os.PathLike, motions: list[Motion]) -> list[tuple[str, Motion]]:

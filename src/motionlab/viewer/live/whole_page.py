@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 
 from .figure import PageFigure
 from .player import bundle_path
@@ -19,22 +20,28 @@ _PAGE = """<!doctype html>
 body {{ font: 1rem/1.5 system-ui, sans-serif; max-width: 72rem; margin: 1rem auto; padding: 0 1rem; }}
 h1 {{ font-size: 1.2rem; margin: 0; }}
 p {{ margin: 0; opacity: 0.75; }}
+p.note {{ opacity: 1; }}
 </style>
 </head>
 <body>
 <h1>{title}</h1>
 <p>{text}</p>
-{figure}
+{notes}{figure}
 <script>{script}</script>
 </body>
 </html>
 """
 
 
-def whole_page(figure: PageFigure, title: str, text: str = "") -> str:
-    """The HTML of a page that holds one figure and the script that brings it to life."""
+def whole_page(figure: PageFigure, title: str, text: str = "", notes: Sequence[str] = ()) -> str:
+    """The HTML of a page that holds one figure and the script that brings it to life.
+
+    notes : what whoever looks at it should know, a line each above the figure.
+    """
     # "</script>" inside the script would end the element
     script = bundle_path().read_text(encoding="utf-8").replace("</script", "<\\/script")
+    lines = "".join(f'<p class="note">note: {html.escape(note)}</p>\n' for note in notes)
     return _PAGE.format(
-        title=html.escape(title), text=html.escape(text), figure=figure.html, script=script
-    )
+        title=html.escape(title), text=html.escape(text), notes=lines, figure=figure.html,
+        script=script,
+    )  # fmt: skip
