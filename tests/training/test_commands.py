@@ -50,6 +50,24 @@ def test_train_prepares_trains_and_goes_on(here, capsys):
     assert f"from {tuned.start_names[0]!r}" in capsys.readouterr().out
 
 
+def test_permissive_weights_are_trained_on_what_is_free(here, monkeypatch, gaits):
+    asked = []
+
+    def prepare(source, progress=False, *, permissive=False, **reading):
+        asked.append((source, permissive))
+        return gaits
+
+    monkeypatch.setattr("motionlab.training.prepared.prepare", prepare)
+    smoke = ["--preset", "smoke", "--accelerator", "cpu", "--updates", "2"]
+    assert main(["train", "lstm-gmm-permissive", *smoke]) == 0
+    assert asked == [("locomotion", True)]
+    assert [path.name for path in (here / "runs").glob("*.npz")] == ["locomotion-permissive.npz"]
+    model = motionlab.load(here / "runs" / "lstm-gmm-permissive-smoke" / "best.safetensors")
+    assert "contacts" in model.encoding.slices
+    assert main(["train", "lstm-gmm-contacts", *smoke]) == 0
+    assert asked[1:] == [("locomotion", False)]
+
+
 def test_a_refiner_is_trained_judged_and_used(here, capsys, monkeypatch):
     monkeypatch.setattr(judging, "UPDATES", 5)
     assert main(["train", "lstm-gmm-contacts", *SMOKE, "--out", "g"]) == 0

@@ -22,7 +22,8 @@ class Train:
     """Train a model; started again, it goes on where it was stopped."""
 
     model: Positional[str]
-    """lstm-gmm, lstm-gmm-contacts; refiner, refiner-contacts of these; or METHOD-STYLE, such as
+    """lstm-gmm, lstm-gmm-contacts, lstm-gmm-permissive (with contacts, on the clips that are free
+    for commercial use); refiner, refiner-contacts of the first two; or METHOD-STYLE, such as
     aclstm-indian: one of the methods aclstm, lstm-3lr, scheduled, erd, seq2seq on one of the styles
     martial, indian, hybrid, walking."""
     preset: Literal["smoke", "table", "ship", "paper"] = "table"
@@ -76,7 +77,8 @@ class Train:
         chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
         style = "locomotion" if "lstm-gmm" in self.model else self.model.rpartition("-")[2]
-        data = Prepared.find(self.data or style, **self.folder.reading())
+        free = self.data is None and self.model.endswith("-permissive")
+        data = Prepared.find(self.data or style, free, **self.folder.reading())
         if self.model == "lstm-gmm":
             data = data.without_contacts()
         start = find(self.start) if self.start else None

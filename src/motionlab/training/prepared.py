@@ -132,20 +132,20 @@ class Prepared:
             ) from error
 
     @classmethod
-    def find(cls, source: str | os.PathLike, **reading) -> Prepared:
+    def find(cls, source: str | os.PathLike, permissive: bool = False, **reading) -> Prepared:
         """A prepared file; or a data set or folder, made ready now if it was not before.
 
         What is made is kept in `file_of(source)`. Folders, whose clips may change, are always read.
-        reading : how to read a folder's files, as for `prepare`.
+        permissive, reading : as for `prepare`; a file has what it has.
         """
         if Path(source).suffix == ".npz" or Path(source).is_file():
             _refuse(source, reading)
             return cls.load(source)
-        kept = file_of(source)
+        kept = file_of(source, permissive)
         if str(source) in (*datasets.names(), *DANCES) and kept.exists():
             _refuse(source, reading)
             return cls.load(kept)
-        made = prepare(source, progress=True, **reading)
+        made = prepare(source, progress=True, permissive=permissive, **reading)
         made.save(kept)
         return made
 

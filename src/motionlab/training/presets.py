@@ -165,7 +165,8 @@ _LSTM_GMM = {
     ),
 }  # fmt: skip
 
-PRESETS = {"lstm-gmm": _LSTM_GMM, "lstm-gmm-contacts": _LSTM_GMM}
+# with contacts, but for the first; the last on what is free for commercial use
+PRESETS = dict.fromkeys(("lstm-gmm", "lstm-gmm-contacts", "lstm-gmm-permissive"), _LSTM_GMM)
 
 
 def build(data: Prepared, preset: Preset, start: Path | None = None) -> nn.Module:
