@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections import Counter
 from functools import lru_cache
 from os.path import commonprefix
@@ -51,6 +52,12 @@ _SIDE_OF = {
     for side, words in zip(SIDES, ("left lft lt l", "right rgt rt r"), strict=True)
     for word in words.split()
 }
+# MikuMikuDance's, longer words before those that they hold
+_JAPANESE = dict(
+    pair.split("=")
+    for pair in "手首=wrist 足首=ankle つま先=toe 下半身=hips 上半身=spine 左=left 右=right 首=neck 頭=head "
+    "肩=shoulder 腕=arm ひじ=elbow 足=leg ひざ=knee 捩=twist".split()
+)
 _SILENT = frozenset(
     "joint jnt jt bone bn bind skin def org bip biped bend stretch center centre mid b c j m x".split()
 )
@@ -67,6 +74,10 @@ _KEPT = frozenset([*_WHOLE, *_SIDE_OF, *_OTHERS.split(), *_BESIDE.split()]) - {"
 @lru_cache(4096)
 def _tokens(name: str) -> tuple[str, ...]:
     """("left", "up", "leg", "1") of "rig:LeftUpLeg.001" and the like, lower case."""
+    name = unicodedata.normalize("NFKC", name)
+    for word, english in _JAPANESE.items():
+        name = name.replace(word, f" {english} ")
+    name = re.sub(r"\[[A-Za-z ]*\]", " ", name)  # Skyrim's "NPC L Thigh [LThg]"
     name = re.sub(r"FBXASC\d{3}", " ", name)  # how FBX writes blanks, dots and the like
     name = re.sub(r"(?i)(?<![a-z])lf(?![a-z])", "left", name)  # but LFArm is a left forearm
     parts = [part for part in re.split(r"[:|]", name) if re.search("[A-Za-z]", part)]

@@ -27,6 +27,8 @@ name that says more, as ``LeftFootIK`` or ``LeftHandThumb1``, gets no role::
     neck          neck necktwist lowerneck upperneck necklower neckupper cervical
     head          head skull
 
+MikuMikuDance's Japanese names are read, too, and what stands in square brackets is left out.
+
 Then the tree: down a leg come upper leg, lower leg, foot and toes, down an arm shoulder, upper arm,
 lower arm and hand, and of two joints that could be either the upper one is it, or the one whose name
 has nothing left out (CMU's ``LeftHip``, which hangs on a ``LHipJoint``). Hips are where both
