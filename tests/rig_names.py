@@ -63,6 +63,7 @@ CONVENTIONS = {
     "mixamo, no colon": "mixamorigHips mixamorigSpine mixamorigSpine2 mixamorigNeck mixamorigHead "
     "mixamorig@Shoulder mixamorig@Arm mixamorig@ForeArm mixamorig@Hand mixamorig@UpLeg "
     "mixamorig@Leg mixamorig@Foot mixamorig@ToeBase Left Right",
+    "mmd": "下半身 上半身 Chest 首 頭 @肩 @腕 @ひじ @手首 @足 @ひざ @足首 @つま先 左 右",
     "momentum": "b_root b_spine0 b_spine3 b_neck0 b_head b_@_clavicle b_@_arm b_@_forearm "
     "b_@_wrist b_@_upleg b_@_leg b_@_talocrural b_@_ball l r",
     "motive": "Hip Ab Chest Neck Head @Shoulder @UArm @FArm @Hand @Thigh @Shin @Foot @Toe L R",
@@ -80,6 +81,9 @@ CONVENTIONS = {
     "ORG-upper_arm.@ ORG-forearm.@ ORG-hand.@ ORG-thigh.@ ORG-shin.@ ORG-foot.@ ORG-toe.@ L R",
     "roblox": "LowerTorso UpperTorso Chest Neck Head @Collar @UpperArm @LowerArm @Hand @UpperLeg "
     "@LowerLeg @Foot @Toes Left Right",
+    "skyrim": "NPC~Pelvis~[Pelv] NPC~Spine~[Spn0] NPC~Spine2~[Spn2] NPC~Neck~[Neck] NPC~Head~[Head] "
+    "NPC~@~Clavicle~[@Clv] NPC~@~UpperArm~[@Uar] NPC~@~Forearm~[@Lar] NPC~@~Hand~[@Hnd] "
+    "NPC~@~Thigh~[@Thg] NPC~@~Calf~[@Clf] NPC~@~Foot~[@ft] NPC~@~Toe0~[@Toe] L R",
     "smpl": "Pelvis Spine1 Spine3 Neck Head @_Collar @_Shoulder @_Elbow @_Wrist @_Hip @_Knee "
     "@_Ankle @_Foot L R",
     "smpl-x": "pelvis spine1 spine3 neck head @_collar @_shoulder @_elbow @_wrist @_hip @_knee "
@@ -193,6 +197,9 @@ RIGS = {
     ".....Bip01~Neck=neck ......Bip01~Head=head .......Bip01~HeadNub ......Bip01~@~Clavicle=shoulder "
     ".......Bip01~@~UpperArm=upper_arm ........Bip01~@~Forearm=lower_arm .........Bip01~@~Hand=hand "
     "..........Bip01~@~Finger0 L R",
+    "mmd": "全ての親 .センター ..グルーブ ...腰 ....下半身=hips .....@足=upper_leg ......@ひざ=lower_leg .......@足首=foot "
+    "........@つま先=toes ....上半身=spine .....上半身2=chest ......首=neck .......頭=head ......@肩=shoulder "
+    ".......@腕=upper_arm ........@腕捩 .........@ひじ=lower_arm ..........@手首=hand .@足ＩＫ ..@つま先ＩＫ 左 右",
     "mpi": "pelvis=hips .spine=spine ..spine2 ...spine3 ....spine4=chest .....neck=neck "
     "......head=head .......head_top .....@_clavicle=shoulder ......@_shoulder=upper_arm "
     ".......@_elbow=lower_arm ........@_wrist=hand .........@_hand .@_hip=upper_leg "

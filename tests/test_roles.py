@@ -86,7 +86,7 @@ def test_names_that_say_more_have_no_role():
 
 
 def test_names_of_other_letters_and_endless_ones():
-    names = ["左足", "右足", "", "l" + "toebase" * 40 + "q", "::", "123"]
+    names = ["нога", "πόδι", "", "l" + "toebase" * 40 + "q", "::", "123"]
     assert roles.find(names, [-1, 0, 0, 0, 0, 0]) == {}
     assert roles.partners(names, {}) == tuple(range(6))
     chain = [f"left_leg_{i}" for i in range(2000)]
@@ -141,6 +141,43 @@ def test_of_two_hips_the_leg_hangs_on_the_one_that_says_no_more():
     assert found["left_upper_leg"] == 2 and found["right_upper_leg"] == 5
     joints = ["Hips_jnt", "LeftHip_jnt", "LeftHip_twist", "LeftKnee_jnt"]
     assert roles.find(joints, [-1, 0, 1, 1])["left_upper_leg"] == 1
+
+
+def test_a_helper_need_not_have_the_letters_before_all_other_names():
+    names = rig_names.names_of(rig_names.CONVENTIONS["low, with a prefix"])
+    found = roles.find([*names, "pelvis", "ik_foot_l"], [*CANONICAL.parents, 0, 0])
+    assert found == CANONICAL.roles
+
+
+def test_what_nearly_all_names_have_is_no_more_than_a_name():
+    """mHipLeft says no more than a hip; Left_hip_joint, on which it hangs, does."""
+    names = [
+        "mPelvis",
+        "Left_hip_joint",
+        "mHipLeft",
+        "mKneeLeft",
+        "mAnkleLeft",
+        "mFootLeft",
+        "mHead",
+    ]
+    found = roles.find(names, [-1, 0, 1, 2, 3, 4, 0])
+    assert found["left_upper_leg"] == 2
+
+
+def test_of_toes_the_upper_one_is_the_joint_of_all():
+    found = roles.find(["hips", "foot_l", "toe_jnt_l", "big_toe_1_l"], [-1, 0, 1, 2])
+    assert found["left_toes"] == 2
+    assert roles.find(["hips", "foot_l", "big_toe_l"], [-1, 0, 1])["left_toes"] == 2
+
+
+def test_what_carries_arms_on_a_neck_is_no_chest():
+    names = [*CANONICAL.names[:3], "Neck_base", *CANONICAL.names[3:]]
+    parents = [p + (p > 2) for p in CANONICAL.parents]
+    parents.insert(3, 2)
+    for name in ("Neck", "LeftShoulder", "RightShoulder"):
+        parents[names.index(name)] = 3
+    found = roles.find(names, parents)
+    assert names[found["chest"]] == "Chest" and names[found["neck"]] == "Neck"
 
 
 def test_a_root_above_the_pelvis_is_not_the_hips():

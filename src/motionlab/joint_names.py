@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+import unicodedata
 from collections import Counter
 from functools import lru_cache
 from os.path import commonprefix
@@ -15,7 +17,8 @@ SIDES = ("left", "right")
 # What words say of a joint that has a side, and how strongly. A limb is read so that the sum of
 # what its joints say is largest; words that leave a choice must be weaker than those that do not.
 CLEAR = 35
-_NEARLY_ALL = 0.6  # share of the joints, of a rig's word such as a prefix
+NEARLY_ALL = 0.6  # share of the joints, of a rig's word such as a prefix
+_GLUED = 4  # letters in front of nearly all names, which a helper's need not have
 _MANY = 10  # joints that share the letters in front of them by no chance
 _LONGEST = 30  # letters of what may be glued to a side's
 _PAIRED = {
@@ -25,7 +28,8 @@ _PAIRED = {
     "leg": {"upper_leg": 30, "lower_leg": 31},
     "ankle talocrural": {"foot": 40},
     "foot": {"foot": 35, "toes": 20},
-    "toe toes toebase ball bigtoe forefoot footindex": {"toes": 40},
+    "toe toes toebase ball forefoot footindex": {"toes": 40},
+    "bigtoe": {"toes": 38},
     "collar collarbone clavicle clav scapula": {"shoulder": 40},
     "shoulder shldr": {"shoulder": 30, "upper_arm": 31},
     "upperarm uparm uarm armupper humerus": {"upper_arm": 40},
@@ -48,6 +52,12 @@ _SIDE_OF = {
     for side, words in zip(SIDES, ("left lft lt l", "right rgt rt r"), strict=True)
     for word in words.split()
 }
+# MikuMikuDance's, longer words before those that they hold
+_JAPANESE = dict(
+    pair.split("=")
+    for pair in "手首=wrist 足首=ankle つま先=toe 下半身=hips 上半身=spine 左=left 右=right 首=neck 頭=head "
+    "肩=shoulder 腕=arm ひじ=elbow 足=leg ひざ=knee 捩=twist".split()
+)
 _SILENT = frozenset(
     "joint jnt jt bone bn bind skin def org bip biped bend stretch center centre mid b c j m x".split()
 )
@@ -64,6 +74,10 @@ _KEPT = frozenset([*_WHOLE, *_SIDE_OF, *_OTHERS.split(), *_BESIDE.split()]) - {"
 @lru_cache(4096)
 def _tokens(name: str) -> tuple[str, ...]:
     """("left", "up", "leg", "1") of "rig:LeftUpLeg.001" and the like, lower case."""
+    name = unicodedata.normalize("NFKC", name)
+    for word, english in _JAPANESE.items():
+        name = name.replace(word, f" {english} ")
+    name = re.sub(r"\[[A-Za-z ]*\]", " ", name)  # Skyrim's "NPC L Thigh [LThg]"
     name = re.sub(r"FBXASC\d{3}", " ", name)  # how FBX writes blanks, dots and the like
     name = re.sub(r"(?i)(?<![a-z])lf(?![a-z])", "left", name)  # but LFArm is a left forearm
     parts = [part for part in re.split(r"[:|]", name) if re.search("[A-Za-z]", part)]
@@ -75,7 +89,7 @@ def _tokens(name: str) -> tuple[str, ...]:
 def readings(names: tuple[str, ...]) -> tuple[tuple[str | None, str, tuple[str, ...]], ...]:
     """Side and word of each name, ("left", "upleg"), and what was left out of it."""
     counts = Counter(token for name in names for token in set(_tokens(name)))
-    enough = max(3, _NEARLY_ALL * len(names))
+    enough = max(3, NEARLY_ALL * len(names))
     common = {token for token, n in counts.items() if n >= enough and token not in _KEPT}
     quiet = common | _SILENT
     letters, left_out = [], []
@@ -92,17 +106,29 @@ def readings(names: tuple[str, ...]) -> tuple[tuple[str | None, str, tuple[str, 
 
 
 def _unglued(letters: list[list[str]]) -> list[list[str]]:
-    """Names without the letters that all of them begin or end with, as in "mixamorighips"."""
+    """Names without the letters that nearly all begin or end with, as in "mixamorighips"."""
     whole = ["".join(words) for words in letters]
-    start, end = commonprefix(whole), commonprefix([word[::-1] for word in whole])[::-1]
+    start, end = _shared(whole), _shared([word[::-1] for word in whole])[::-1]
     of_a_body = any(part in _WHOLE or _side([part])[0] for part in (start, end))
-    if len(whole) < _MANY or of_a_body or len(start + end) >= min(map(len, whole)):
+    if len(whole) < _MANY or of_a_body:
         return letters
-    return [
-        [word.removeprefix(start if i == 0 else "").removesuffix(end if i == len(words) - 1 else "")
-         for i, word in enumerate(words)]
-        for words in letters
-    ]  # fmt: skip
+    cut = []
+    for words, word in zip(letters, whole, strict=True):
+        first, last = (part if fits else "" for part, fits in
+                       ((start, word.startswith(start)), (end, word.endswith(end))))  # fmt: skip
+        if len(first + last) < len(word):
+            words = [words[0].removeprefix(first), *words[1:]]
+            words[-1] = words[-1].removesuffix(last)
+        cut.append(words)
+    return cut
+
+
+def _shared(words: list[str]) -> str:
+    """What all words begin with, or, if it is `_GLUED` letters at least, nearly all."""
+    ordered, most = sorted(words), math.ceil(NEARLY_ALL * len(words))
+    windows = zip(ordered, ordered[most - 1 :], strict=False)
+    often = max((commonprefix(pair) for pair in windows), key=len, default="")
+    return often if len(often) >= _GLUED else commonprefix(ordered)
 
 
 def _side(letters: list[str]) -> tuple[str | None, str]:

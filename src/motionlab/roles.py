@@ -27,6 +27,8 @@ name that says more, as ``LeftFootIK`` or ``LeftHandThumb1``, gets no role::
     neck          neck necktwist lowerneck upperneck necklower neckupper cervical
     head          head skull
 
+MikuMikuDance's Japanese names are read, too, and what stands in square brackets is left out.
+
 Then the tree: down a leg come upper leg, lower leg, foot and toes, down an arm shoulder, upper arm,
 lower arm and hand, and of two joints that could be either the upper one is it, or the one whose name
 has nothing left out (CMU's ``LeftHip``, which hangs on a ``LHipJoint``). Hips are where both
@@ -42,13 +44,14 @@ from __future__ import annotations
 import json
 import os
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 
 from .errors import SkeletonError
-from .joint_names import CLEAR, LIMB_OF, SIDES, TRUNK_OF, readings
+from .joint_names import CLEAR, LIMB_OF, NEARLY_ALL, SIDES, TRUNK_OF, readings
 
 TRUNK = ("hips", "spine", "chest", "neck", "head")
 ARM = ("shoulder", "upper_arm", "lower_arm", "hand")
@@ -96,7 +99,9 @@ def _find(
     """The roles and their joints; given : those that were said, None for a role without a joint."""
     said = dict(given)
     sides, words, left_out = zip(*readings(names), strict=True)
-    plain = [not any(map(str.isalpha, rest)) for rest in left_out]
+    counts = Counter(token for rest in left_out for token in set(rest))
+    common = {token for token, n in counts.items() if n >= NEARLY_ALL * len(names)}
+    plain = [not any(map(str.isalpha, {*rest} - common)) for rest in left_out]
     limbs: dict[str, int] = {}
     for side in SIDES:
         own = [word if s == side else "" for s, word in zip(sides, words, strict=True)]
@@ -302,8 +307,8 @@ def _trunk(
     legs, arms = (_meeting(limbs, part, parents) for part in ("upper_leg", "upper_arm"))
     settle("hips", legs[-1:], [j for j in of("hips") if words[j] != "root"], of("hips"))
     hips = _line(found.get("hips"), parents)
-    # a root may carry all limbs itself, and Biped's neck carries the arms
-    arms = [joint for joint in arms if joint not in hips and kinds[joint] != "neck"]
+    # a root may carry all limbs itself, and Biped's neck carries the arms, another rig's neck_base
+    arms = [joint for joint in arms if joint not in hips and "neck" not in (words[joint] or "")]
     settle("chest", arms[-1:], of("chest"))
     chest = _line(found.get("chest"), parents)
     between = [joint for joint in chest[:-1] if joint not in hips] if hips else []

@@ -217,3 +217,9 @@ def test_heights_above_a_floor_are_not_told_from_a_rest_pose_that_stands_on_none
         contacts.label(motion, "speed-height", floor=0.0)
     found = contacts.label(motion, "speed-height")
     assert torch.equal(found, contacts.label(walk(), "speed-height"))
+
+
+def test_a_rest_pose_with_one_foot_higher_stands_on_no_floor():
+    offsets = CANONICAL.offsets.clone()
+    offsets[CANONICAL.role("left_upper_leg"), 1] += 0.03
+    assert not stands_on_floor(replace(CANONICAL, offsets=offsets))

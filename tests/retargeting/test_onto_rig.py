@@ -15,7 +15,8 @@ from motionlab import Motion, Skeleton
 from motionlab.datasets import gaits
 from motionlab.errors import RetargetError
 from motionlab.retargeting import onto_rig, retarget
-from motionlab.retargeting.onto_rig import reaxed, standing
+from motionlab.retargeting.joints_between import reaxed
+from motionlab.retargeting.onto_rig import standing
 
 CANONICAL = Skeleton.canonical()
 WALK = gaits.make(seconds=1.5, speed=1.3, turn_rate=0.4, name="walk")

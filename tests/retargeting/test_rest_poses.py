@@ -74,6 +74,24 @@ def test_a_step_is_no_stance(frame):
     assert apart(other.retarget(), motion) < 2.0
 
 
+def test_shoulders_across_the_hips_are_no_stance():
+    """Legs and trunk are straight and upright, but the rest pose is twisted in the spine."""
+    motion = GAITS["walk_1.3"][:40]
+    turn = about("y", 0.0).clone()
+    turn[1 : CANONICAL.role("left_upper_leg")] = about("y", 50.0)[0]
+    other = redrawn(motion, turn)
+    assert not upright(other.skeleton)
+    assert apart(other.retarget(), motion) < 2.0
+
+
+def test_a_neck_that_never_is_as_at_rest_is_as_in_motion():
+    motion, turn = GAITS["walk_1.3"][:40], about("y", 0.0).clone()
+    turn[CANONICAL.role("neck")] = about("x", 120.0)[0]
+    other = redrawn(motion, turn)
+    assert upright(other.skeleton)
+    assert apart(other.retarget(), motion) < 2.0
+
+
 def test_where_feet_come_down_is_found_as_well():
     motion = GAITS["walk_1.3"]
     for turn in (about("y", 45.0), about("x", 90.0) @ about("y", 20.0)):

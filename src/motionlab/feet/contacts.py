@@ -37,6 +37,7 @@ __all__ = [
 
 CHANNELS = ("left heel", "left toe", "right heel", "right toe")
 RULES = ("speed", "speed-height")
+_LEVEL = 0.025  # of a shank, by how much one foot may lie higher than the other on one floor
 
 
 def label(
@@ -148,8 +149,8 @@ def rest_heights(skeleton: Skeleton) -> Tensor:
 def stands_on_floor(skeleton: Skeleton) -> bool:
     """Whether the rest pose stands on the floor y = 0, feet flat, so that `rest_heights` are theirs.
 
-    Many files have a rest pose that floats, hangs from its root at the origin, or lies: heights
-    would be wrong by a metre.
+    Many files have a rest pose that floats, hangs from its root at the origin, lies, or has one foot
+    higher than the other: heights would be wrong by up to a metre.
     """
     heights, rest = rest_heights(skeleton), skeleton.rest_points
     feet = foot_points(skeleton)
@@ -159,7 +160,8 @@ def stands_on_floor(skeleton: Skeleton) -> bool:
         tiptoe = rest[foot, 1] - rest[toe, 1] > 0.9 * (rest[foot] - rest[toe]).norm()
         if tiptoe or not hangs:
             return False
-    return bool(-0.05 * shank < heights.min() and heights.max() < 0.6 * shank)
+    level = (heights[:2] - heights[2:]).abs().max() < _LEVEL * shank
+    return bool(level and -0.05 * shank < heights.min() and heights.max() < 0.6 * shank)
 
 
 def foot_speeds(feet: Tensor, fps: float, step: float = 1 / 30) -> Tensor:

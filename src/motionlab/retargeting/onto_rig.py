@@ -22,6 +22,7 @@ from ..errors import RetargetError
 from ..motion import Motion
 from ..roles import SIDES
 from ..skeleton import Skeleton
+from .joints_between import in_axes, reaxed
 from .rest_alignment import alignment, bone, facing, frame, stands
 from .retarget import NEEDED, retarget
 from .stance import find_stance
@@ -62,7 +63,7 @@ def onto_rig(motion: Motion, rig: Motion, *, reference: Motion | None = None) ->
         return retarget(motion, rig.skeleton)  # which says what is missing
     axes = standing(rig)
     twin = retarget(motion, _with_toes(reaxed(rig.skeleton, axes)), reference=reference)
-    rotations = _in_axes(twin.rotations, twin.skeleton, axes.mT)
+    rotations = in_axes(twin.rotations, twin.skeleton, axes.mT)
     return replace(twin, skeleton=rig.skeleton, rotations=rotations)
 
 
@@ -100,23 +101,11 @@ def _learned(rig: Motion, stance: Motion | None) -> Tensor:
     turned = replace(
         seen,
         skeleton=reaxed(skeleton, calm),
-        rotations=_in_axes(seen.rotations, skeleton, calm),
+        rotations=in_axes(seen.rotations, skeleton, calm),
         contacts=None,
     )
     found = alignment(turned, Skeleton.canonical(), None if stance is None else turned)
     return _spread(seen, {roles[role]: axes.mT for role, axes in found.items()})
-
-
-def reaxed(skeleton: Skeleton, axes: Tensor) -> Skeleton:
-    """The same joints with other axes: at rest they stand as here with orientations `axes`.
-
-    axes : (joints, 3, 3). Orientations R of a joint here are ``R @ axes.mT`` there.
-    """
-    above = axes[list(skeleton.parents)]
-    offsets = (above @ skeleton.offsets[..., None])[..., 0]
-    offsets[0] = skeleton.offsets[0]
-    ends = (axes[list(skeleton.end_parents)] @ skeleton.end_offsets[..., None])[..., 0]
-    return replace(skeleton, offsets=offsets, end_offsets=ends)
 
 
 def _with_toes(twin: Skeleton) -> Skeleton:
@@ -136,13 +125,6 @@ def _leg(skeleton: Skeleton) -> Tensor:
     """Metres () from an ankle of a standing skeleton up to the hip joint."""
     points, roles = skeleton.rest_points, skeleton.roles
     return points[roles["left_upper_leg"], 1] - points[roles["left_foot"], 1]
-
-
-def _in_axes(rotations: Tensor, skeleton: Skeleton, axes: Tensor) -> Tensor:
-    """Local rotations (frames, joints, 3, 3) of a skeleton, on the one that `reaxed` makes of it."""
-    above = axes[list(skeleton.parents)]
-    above[0] = torch.eye(3)
-    return above @ rotations @ axes.mT
 
 
 def _rest_turned(skeleton: Skeleton) -> Tensor:

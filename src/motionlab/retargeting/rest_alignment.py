@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -61,7 +61,9 @@ _ACROSS = 12.0  # or within this of being square to the hinge about which it tur
 _UPRIGHT, _SHARE = 0.7, 0.05  # of a trunk one long, what points up; of frames, those that must
 # A bone of the trunk tells nothing that is farther than this from where the mean pose has it.
 _COS_ASTRAY = math.cos(math.radians(45.0))
+_NEVER = 50.0  # degrees from the rest pose, on average of what a trunk does while it is upright
 SHORT = 0.01  # metres; a shorter bone tells no direction
+_SQUARE = 0.9  # cosine between the lines through hips and shoulders of a body that only stands
 _STRIDE = 0.1  # of legs one long, how far one may point ahead of the other in a stance
 _LEFT, _UP = torch.tensor([1.0, 0.0, 0.0]), torch.tensor([0.0, 1.0, 0.0])
 
@@ -76,7 +78,25 @@ def alignment(motion: Motion, target: Skeleton, reference: Motion | None) -> dic
     stance = stance_of(motion, reference)
     if stance is None:
         return _from_motion(motion, target, roles)
-    return _from_stance(stance, target, roles)
+    axes = _from_stance(stance, target, roles)
+    return axes if reference is not None else axes | _contradicted(axes, motion)
+
+
+def _contradicted(axes: dict[str, Tensor], motion: Motion) -> dict[str, Tensor]:
+    """Axes of joints of the trunk that never are in motion as at rest, though that seems to stand.
+
+    A joint in the place of another, of which no bone tells how it lies: a pelvis, say. Heads may
+    look anywhere.
+    """
+    source, points = motion.skeleton, motion.positions()
+    rises = rising(points, source)
+    if rises.float().mean() < _SHARE:
+        return {}
+    ahead, orientations = facing(points[rises], source), motion.orientations()[rises]
+    trunk = [joint for joint, _ in TRUNK if joint in axes and joint != "head"]
+    seen = {joint: _mean(orientations[:, source.roles[joint]].mT @ ahead) for joint in trunk}
+    apart = lambda joint: roma.rotmat_geodesic_distance(axes[joint], seen[joint])
+    return {joint: its for joint, its in seen.items() if apart(joint) > math.radians(_NEVER)}
 
 
 def stance_of(motion: Motion, reference: Motion | None = None) -> Motion | None:
@@ -111,6 +131,9 @@ def upright(skeleton: Skeleton) -> bool:
     points, roles = skeleton.rest_points, skeleton.roles
     at = lambda role: points[roles[role]]
     across = at("left_upper_leg") - at("right_upper_leg")
+    shoulders = at("left_upper_arm") - at("right_upper_arm")
+    if _unit(across) @ _unit(shoulders) < _SQUARE:
+        return False
     if across.norm() == 0 or across[[0, 2]].norm() < 0.9 * across.norm():
         return False
     ahead = torch.linalg.cross(_unit(across), _UP)
@@ -161,12 +184,19 @@ def frame(first: Tensor, second: Tensor) -> Tensor:
 
 
 def bone(skeleton: Skeleton, joint: str, child: str) -> Tensor | None:
-    """Where a limb's joint points in its own frame (3,): at its child or else at its end site."""
+    """Where a limb's joint points in its own frame (3,): at its child or else at its end site.
+
+    A single joint on which nothing hangs is an end site, too.
+    """
     offset = skeleton.below(joint, child)
     if offset is None:
-        ends = zip(skeleton.end_parents, skeleton.end_offsets, strict=True)
         start = skeleton.roles[joint]
-        offset = next((offset for parent, offset in ends if parent == start), torch.zeros(3))
+        ends = zip(skeleton.end_parents, skeleton.end_offsets, strict=True)
+        tips = [offset for parent, offset in ends if parent == start]
+        on = [point for point, parent in enumerate(skeleton.point_parents) if parent == start]
+        if not tips and len(on) == 1 and on[0] not in skeleton.point_parents:
+            tips = [skeleton.offsets[on[0]]]
+        offset = tips[0] if tips else torch.zeros(3)
     return offset if offset.norm() > SHORT else None
 
 
@@ -223,11 +253,15 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
         if joint not in roles:
             continue
         ours, theirs = bone(target, joint, child), bone(source, joint, child)
+        if child in roles:
+            theirs = _lies(points, world[joint], source, joint, child)
+            theirs = None if theirs is None or theirs.norm() < SHORT else theirs
         if theirs is None and joint == "head" and "neck" in axes:
             axes[joint] = axes["neck"]
         else:
             seen = _mean(world[joint].mT @ ahead)
-            axes[joint] = _trunk_axes(seen, ours, theirs, _pair(source, joint), drawn)
+            pair = _pair(source, joint, lambda *of: _lies(points, world[of[0]], source, *of))
+            axes[joint] = _trunk_axes(seen, ours, theirs, pair, drawn)
     for side in SIDES:
         at = lambda part, side=side: points[:, source.roles[f"{side}_{part}"]]
         for parts, rest_hinge in (
@@ -257,6 +291,19 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
     return axes
 
 
+def _lies(points: Tensor, world: Tensor, source: Skeleton, joint: str, child: str) -> Tensor | None:
+    """Where one joint lies in the frame of another (3,); None if it moves there and hangs elsewhere.
+
+    On average in motion if there are joints between, whose rest pose may be any.
+    """
+    start, end = source.roles[joint], source.roles[child]
+    if source.parents[end] == start:
+        return source.offsets[end]
+    seen = (world.mT @ (points[:, end] - points[:, start])[..., None])[..., 0]
+    hangs = source.below(joint, child) is not None
+    return seen.mean(0) if hangs or (seen - seen.mean(0)).norm(dim=-1).max() < SHORT else None
+
+
 def _mean(rotations: Tensor) -> Tensor:
     """Mean (3, 3) of rotations (frames, 3, 3)."""
     return roma.special_procrustes(rotations.mean(0))
@@ -275,11 +322,11 @@ def _trunk_axes(
     if ours is None or (theirs is not None and _unit(theirs) @ (seen @ _unit(ours)) < _COS_ASTRAY):
         ours, theirs = _UP, None  # as where hips lie before the spine, so that their bone goes back
     second = _UP if ours[0].abs() > ours[1].abs() else _LEFT  # besides the bone: of a collar, up
-    if not drawn:
+    along, left = _along(theirs), _along(pair)
+    if not drawn or (along is None and left is None and theirs is not None and pair is not None):
         if pair is not None:
             return frame(pair, seen @ _UP if theirs is None else theirs)
         return seen if theirs is None else frame(theirs, seen @ second) @ frame(ours, second).mT
-    along, left = _along(theirs), _along(pair)
     if along is not None:
         beside = pair if pair is not None and second is _LEFT else _nearest_axis(seen @ second)
         return frame(along, beside) @ frame(ours, second).mT
@@ -299,11 +346,16 @@ def _drawn_along_axes(skeleton: Skeleton) -> bool:
     return sum(_axis_near(each, _EXACT) is not None for each in bones) > len(bones) / 2
 
 
-def _pair(skeleton: Skeleton, joint: str) -> Tensor | None:
-    """From right to left (3,) between the legs that hang on the hips, or collars or arms on a chest."""
+def _pair(
+    skeleton: Skeleton, joint: str, lies: Callable[[str, str], Tensor | None] | None = None
+) -> Tensor | None:
+    """From right to left (3,) between the legs that hang on the hips, or collars or arms on a chest.
+
+    lies : where a joint lies in another's frame; None: as at rest.
+    """
     for part in {"hips": ("upper_leg",), "chest": ("shoulder", "upper_arm")}.get(joint, ()):
         if all(f"{side}_{part}" in skeleton.roles for side in SIDES):
-            ends = [skeleton.below(joint, f"{side}_{part}") for side in SIDES]
+            ends = [(lies or skeleton.below)(joint, f"{side}_{part}") for side in SIDES]
             if all(end is not None for end in ends) and (ends[0] - ends[1]).norm() > SHORT:
                 return ends[0] - ends[1]
     return None

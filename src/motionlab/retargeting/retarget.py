@@ -34,6 +34,7 @@ from ..ik.turns import shortest_turn
 from ..roles import SIDES
 from ..skeleton import Skeleton
 from .hips import follow, sink, stretched
+from .joints_between import settled
 from .rest_alignment import (
     ELBOW,
     SHORT,
@@ -102,7 +103,8 @@ def retarget(
     if _same_body(motion.skeleton, skeleton):
         return replace(motion, skeleton=skeleton)
     _check(motion, skeleton, reference)
-    return _retarget(motion, skeleton, reference)
+    reference = None if reference is None else settled(reference)
+    return _retarget(settled(motion), skeleton, reference)
 
 
 def _moves(value: object) -> bool:
