@@ -54,6 +54,7 @@ SOURCES += ("o3de-motionmatching", "virvig-jl")
 FPS = 30.0
 FOOT, STANCE, JUMP, ACCELERATION, BACKWARDS = 45.0, 5.0, 5.0, 1.2, -3.0  # issue 22's targets
 ENOUGH, CALM = 5, 0.05
+LEAST = 3  # frames; fewer have no acceleration: the T-pose of virvig-jl
 # measure: whether a value misses its target
 TARGETS = {
     "foot direction, median (deg)": lambda value: value > FOOT,
@@ -105,6 +106,7 @@ def measured(source: str) -> dict[str, dict[str, float]]:
 def retargeted(source: str) -> Iterator[tuple[Motion, Motion]]:
     """Every clip before and after, as `locomotion` and a folder of such clips would bring it."""
     motions = [motion.resample(FPS) for motion in datasets.load(source)]
+    motions = [motion for motion in motions if len(motion) >= LEAST]
     stance = loader.stance(source)
     references = [stance] * len(motions)
     if stance is None:
