@@ -185,7 +185,7 @@ def test_the_cache_format_is_that_of_this_retargeting():
     )
     points = locomotion.bring(replace(small, source="made")).positions()
     hand, ankle, toes = (points[[20, 60, 100], CANONICAL.index(f"left_{part}")] for part in PARTS)
-    assert locomotion.FORMAT == 7
+    assert locomotion.FORMAT == 8
     expected = torch.tensor(GOLDEN)
     torch.testing.assert_close(torch.stack([hand, ankle, toes]), expected, rtol=0, atol=1e-3)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import roma
 import torch
 
-from motionlab.feet.planting import Sole, find_contacts, let_go, levelled, plant
+from motionlab.feet.planting import Foot, Sole, find_contacts, let_go, levelled, plant
 
 FPS, FRAMES = 30, 60
 SOLE = torch.tensor([0.0, -0.0749, 0.0906])
@@ -83,3 +85,35 @@ def test_toes_that_scrape_the_floor_in_a_swing_go_up_and_the_leg_stays_as_it_was
     found = let_go(plant(ankle, foot, foot, contacts, sole), hip, stretch, 0.8, FPS)
     assert ((hip - found.ankle).norm(dim=-1) - stretch).abs().max() < 1e-3
     assert (found.ankle + found.reach)[:, 1].min() > 0.025
+
+
+def on_toes_after_heels() -> tuple[Foot, torch.Tensor, torch.Tensor]:
+    """A foot that stands flat, then on its toes, under hips too low for the leg that is wanted; and
+    the hips, and how long the leg should be."""
+    contacts = torch.ones(FRAMES, 2, dtype=torch.bool)
+    contacts[30:, 0] = False
+    ankle = torch.tensor([0.0, 0.1, 0.0]).expand(FRAMES, 3)
+    sole = Sole(SOLE, torch.tensor([0.0, 0.0, 0.06]), torch.tensor([0.1, 0.0251]))
+    hip = torch.tensor([0.0, 0.86, 0.05]).expand(FRAMES, 3)
+    stretch = (hip - ankle).norm(dim=-1) - 0.015  # which the heel, risen, would give at once
+    return plant(ankle, pitched(0), pitched(0), contacts, sole), hip, stretch
+
+
+def test_a_heel_that_may_rise_takes_its_time():
+    planted, hip, stretch = on_toes_after_heels()
+    found = let_go(planted, hip, stretch, 0.8, FPS)
+    step = (hip - found.ankle).norm(dim=-1).diff().abs()
+    assert step.max() < 0.006  # of 15 mm
+    assert ((hip - found.ankle).norm(dim=-1) - stretch)[40:].abs().max() < 1e-3
+    toe = found.ankle + found.reach
+    assert toe.diff(dim=0).norm(dim=-1).max() < 1e-4
+
+
+def test_one_touch_of_the_toes_turns_no_foot_long_before():
+    planted, hip, stretch = on_toes_after_heels()
+    contacts = torch.zeros(FRAMES, 2, dtype=torch.bool)
+    contacts[50, 1] = True
+    planted = replace(planted, contacts=contacts)
+    found = let_go(planted, hip, stretch, 0.8, FPS)
+    assert abs(pitch(found.foot)[50]) > 5
+    assert pitch(found.foot)[:34].abs().max() < 0.1

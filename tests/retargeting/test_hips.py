@@ -10,6 +10,8 @@ import torch
 
 from motionlab import Motion, Skeleton
 from motionlab.datasets import gaits
+from motionlab.feet.planting import Foot, Sole
+from motionlab.retargeting.hips import follow
 
 CANONICAL = Skeleton.canonical()
 SIDES = ("left", "right")
@@ -105,3 +107,22 @@ def test_a_held_foot_is_held_while_hips_follow():
     feet = [CANONICAL.role(f"{side}_{part}") for side in SIDES for part in ("foot", "toes")]
     step = found.positions()[:, feet].diff(dim=0).norm(dim=-1)
     assert step[found.contacts[1:] & found.contacts[:-1]].max() < 1e-3
+
+
+def test_a_foot_about_to_stand_pulls_the_hips_as_it_will_then():
+    """A foot on its toes lies wherever its heel has not risen yet; hips had leant towards it."""
+    frames, sole = 40, torch.tensor([0.0, -0.0749, 0.0906])
+    flat = Sole(sole, torch.zeros(3), torch.tensor([0.1, 0.0251]))
+    contacts = torch.ones(frames, 2, dtype=torch.bool)
+    feet, starts = [], torch.tensor([[[0.1, 0.87, 0.0]], [[-0.1, 0.87, 0.0]]]).repeat(1, frames, 1)
+    for x in (0.1, -0.1):
+        ankle = torch.tensor([x, 0.1, 0.0]).repeat(frames, 1)
+        eye = torch.eye(3).repeat(frames, 1, 1)
+        feet.append(Foot(ankle, eye, eye, contacts, torch.zeros(frames, 3), flat))
+    stretch = (starts - torch.stack([foot.ankle for foot in feet])).norm(dim=-1)
+    rises = contacts.clone()
+    rises[:20, 0] = False
+    ankle = feet[1].ankle.clone()
+    ankle[:20, 1] += 0.04  # on its toes, before `let_go` has seen to its heel
+    feet[1] = replace(feet[1], ankle=ankle, contacts=rises)
+    assert follow(feet, starts, stretch, 30).norm(dim=-1).max() < 1e-3

@@ -21,7 +21,7 @@ from ..retargeting import retarget
 from .registry import LOCOMOTION_FPS
 
 # Raise this when retargeting changes, so that cached results are made anew.
-FORMAT = 7
+FORMAT = 8
 # Where a source's rest pose is no standing body: a clip that begins with standing upright, and how
 # many frames of it.
 STANCES = {"accad": ("Male1_B1_StandToWalk", 30), "virvig-jl": ("JL_mm_tpose", 1)}

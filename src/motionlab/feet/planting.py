@@ -48,8 +48,10 @@ _FLAT, _NEAR_STANCE, _FLATTEST, _STEEPER = (-0.25, 0.95), (-0.45, 0.25), 0.75, 0
 _RESTED = 0.3  # seconds of standing that tell how a flat foot looks
 _ROLL, _ROUNDS = 0.5, 6  # radians that a heel may rise or sink about toes that are down
 _CLEAR = 0.35  # radians that toes may go up lest they scrape the floor in a swing
+_MENDED = 0.001  # metres that a leg is still too long or short when its heel has mended it
 _GAP = 0.02  # metres by which a leg may be too long or short for toes to be down
 _EASE = 0.15  # seconds in which a foot that left the floor, or comes to it, is let go of
+_TURN = 0.5  # seconds in which a heel that rose or sank about toes on the floor turns back
 _UP = torch.tensor([0.0, 1.0, 0.0])
 
 
@@ -226,7 +228,8 @@ def let_go(planted: Foot, hip: Tensor, stretch: Tensor, longest: float, fps: flo
 
     About toes that are down the heel rises or sinks; toes that the leg does not reach then, of feet
     longer than this, are not in contact after all. In the air, the ankle comes nearer to the hip or
-    goes away from it. Nothing lies below the floor then.
+    goes away from it. Nothing lies below the floor then. From what a contact leaves to what is
+    wanted the knee goes over a while, and its angle does, as near straight a millimetre is much.
 
     Parameters
     ----------
@@ -237,21 +240,19 @@ def let_go(planted: Foot, hip: Tensor, stretch: Tensor, longest: float, fps: flo
     fps : frames per second.
     """
     before = planted.ankle - planted.shift
-    roll, missing = _heel_roll(planted, hip, stretch)
-    on_toes = planted.touches & ~planted.contacts[:, 0]
-    far = (missing.abs() > _GAP) | (stretch - missing > longest)
-    far = maximum_filter1d(far.numpy(), 2 * round(_EASE * fps / 3) + 1)
-    lost = on_toes & torch.from_numpy(far)
+    wanted = _bend(stretch, longest)
+    roll, lost = _planned_roll(planted, hip, stretch, longest, fps)
     planted = replace(planted, contacts=planted.contacts & ~lost[:, None])
     touches = planted.touches
-    roll = bridged(roll.where(on_toes, 0.0)[:, None], touches)[:, 0]
+    on_toes = touches & ~planted.contacts[:, 0]
+    roll = _faded(roll.where(on_toes, 0.0), touches, fps, _TURN)
     foot = replace(planted, foot=turn_about(planted.foot[..., 0], roll) @ planted.foot)
     ankle = before + bridged(planted.shift + planted.reach - foot.reach, touches)
     leg = ankle - hip
-    length = leg.norm(dim=-1, keepdim=True).clamp(min=1e-6)
-    # what contacts leave too short or too long is let go of after them, and taken up before them
-    missing = bridged(stretch[:, None] - length, touches) * (1 - _loose(touches, fps)[:, None])
-    ankle = hip + leg / length * (stretch[:, None] - missing)
+    length = leg.norm(dim=-1).clamp(min=1e-6)
+    # and what contacts leave too short or too long is let go of after them, taken up before them
+    left = _faded(_bend(length, longest) - wanted, touches, fps)
+    ankle = hip + leg * (_length(wanted + left, longest) / length)[:, None]
     # toes that scrape the floor in a swing go up before the ankle does
     room = ankle[:, 1].clamp(min=float(foot.sole.heights[0] - _DIP)) - foot.sole.heights[1] + _TIP
     clear = roma.rotmat_to_rotvec(off_the_floor(foot.foot, room, foot.sole.toes) @ foot.foot.mT)
@@ -260,6 +261,26 @@ def let_go(planted: Foot, hip: Tensor, stretch: Tensor, longest: float, fps: flo
     ankle = ankle + foot.depth.clamp(min=0)[:, None] * _UP
     toes = off_the_floor(foot.toes, (ankle + foot.reach)[:, 1], foot.sole.tip)
     return replace(foot, ankle=ankle, toes=toes, shift=ankle - before)
+
+
+def _planned_roll(
+    foot: Foot, hip: Tensor, stretch: Tensor, longest: float, fps: float
+) -> tuple[Tensor, Tensor]:
+    """Angles (frames,) by which heels rise while toes are down, and where toes are lost (frames,).
+
+    What heels on the floor leave too short or too long, and toes whose heel can't mend it, goes
+    over to nothing beside them, so that no heel rises in one frame.
+    """
+    heels = foot.contacts[:, 0]
+    on_toes = foot.touches & ~heels
+    missing = _heel_roll(foot, hip, stretch)[1]
+    far = (missing.abs() > _GAP) | (stretch - missing > longest)
+    lost = on_toes & torch.from_numpy(maximum_filter1d(far.numpy(), 2 * round(_EASE * fps / 3) + 1))
+    wanted = _bend(stretch, longest)
+    reached = torch.where(heels, (foot.ankle - hip).norm(dim=-1), stretch - missing)
+    fixed = heels | (on_toes & (missing.abs() > _MENDED))
+    left = _faded(_bend(reached, longest) - wanted, fixed, fps)
+    return _heel_roll(foot, hip, _length(wanted + left, longest))[0], lost
 
 
 def _heel_roll(foot: Foot, hip: Tensor, stretch: Tensor) -> tuple[Tensor, Tensor]:
@@ -277,12 +298,27 @@ def _heel_roll(foot: Foot, hip: Tensor, stretch: Tensor) -> tuple[Tensor, Tensor
     return roll, stretch - length
 
 
-def _loose(touches: Tensor, fps: float) -> Tensor:
-    """How free (frames,) a foot is, from 0 at its contacts to 1 a while away from them."""
+def _bend(length: Tensor, longest: float) -> Tensor:
+    """How far (frames,) a leg so long is bent, in radians, if its two bones are alike."""
+    return 2 * (length / longest).clamp(0, 1).arccos()
+
+
+def _length(bend: Tensor, longest: float) -> Tensor:
+    """Metres (frames,) that a leg is long which is so far bent."""
+    return longest * (bend.clamp(min=0) / 2).cos()
+
+
+def _faded(values: Tensor, known: Tensor, fps: float, seconds: float = _EASE) -> Tensor:
+    """Values (frames,), known in some frames, that go over to zero beside these."""
+    return bridged(values[:, None], known)[:, 0] * (1 - _loose(known, fps, seconds))
+
+
+def _loose(touches: Tensor, fps: float, seconds: float) -> Tensor:
+    """How free (frames,) a foot is, from 0 at its contacts to 1 so long away from them."""
     if not touches.any():
         return torch.ones(len(touches))
     away = torch.from_numpy(distance_transform_edt(~touches.numpy())).float()
-    part = (away / (_EASE * fps)).clamp(max=1)
+    part = (away / (seconds * fps)).clamp(max=1)
     return part**2 * (3 - 2 * part)
 
 

@@ -46,7 +46,9 @@ def follow(feet: list[Foot], starts: Tensor, stretch: Tensor, fps: float) -> Ten
 
     starts : (2, frames, 3) metres, where the legs start; stretch : (2, frames) metres.
     """
-    stands = _weights(feet, fps)
+    on = _stood_on(feet)
+    # from 0 to 1 and back over a moment, so that a body goes over from one foot to the other
+    stands = torch.from_numpy(gaussian_filter1d(on.float().numpy(), _OVER * fps, mode="nearest"))
     moved = torch.zeros_like(starts[0])
     known = stands.amax(0) > 0.3
     if not known.any():
@@ -60,7 +62,9 @@ def follow(feet: list[Foot], starts: Tensor, stretch: Tensor, fps: float) -> Ten
         way = starts + moved - ankles
         length = way.norm(dim=-1, keepdim=True).clamp(min=1e-6)
         way = way / length
-        missing = weights * (stretch - length[..., 0])
+        # beside its stance a foot asks for what it does there: on its toes, its heel is yet to rise
+        missing = (stretch - length[..., 0])[..., None]
+        missing = weights * torch.stack(list(map(bridged, missing, on)))[..., 0]
         pulls = torch.einsum("sf,sfi,sfj->fij", weights, way, way) + _SLACK * torch.eye(3)
         moved = moved + torch.linalg.solve(pulls, (missing[..., None] * way).sum(0))
     moved = bridged(moved, known)
@@ -70,18 +74,15 @@ def follow(feet: list[Foot], starts: Tensor, stretch: Tensor, fps: float) -> Ten
     return moved
 
 
-def _weights(feet: list[Foot], fps: float) -> Tensor:
-    """How much (2, frames) each foot is stood on: by its heel, or by its toes where no heel is.
-
-    From 0 to 1 and back over a moment, so that a body goes over from one foot to the other.
-    """
+def _stood_on(feet: list[Foot]) -> Tensor:
+    """Whether (2, frames) each foot is stood on: by its heel, or by its toes where no heel is."""
     heels = torch.stack([foot.contacts[:, 0] for foot in feet])
     stands = heels.clone()
     for foot, on in zip(feet, stands, strict=True):
         for start, end in runs(foot.touches.numpy()):
             if foot.touches[start] and not on[start:end].any():
                 on[start:end] = ~heels[:, start:end].any(0)
-    return torch.from_numpy(gaussian_filter1d(stands.float().numpy(), _OVER * fps, mode="nearest"))
+    return stands
 
 
 def sink(
