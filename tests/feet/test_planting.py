@@ -117,3 +117,12 @@ def test_one_touch_of_the_toes_turns_no_foot_long_before():
     found = let_go(planted, hip, stretch, 0.8, FPS)
     assert abs(pitch(found.foot)[50]) > 5
     assert pitch(found.foot)[:34].abs().max() < 0.1
+
+
+def test_a_heel_sinks_into_no_floor_to_make_a_leg_longer():
+    """It was lifted out of it again, and took along the toes that were to rest."""
+    planted, hip, stretch = on_toes_after_heels()
+    found = let_go(planted, hip, stretch + 0.045, 0.85, FPS)
+    toe = found.ankle + found.reach
+    assert toe.diff(dim=0).norm(dim=-1).max() < 1e-4
+    assert found.contacts[:, 1].all()

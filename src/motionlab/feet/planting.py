@@ -288,13 +288,17 @@ def _heel_roll(foot: Foot, hip: Tensor, stretch: Tensor) -> tuple[Tensor, Tensor
     wanted, and metres (frames,) that it is too short then."""
     axis, reach = foot.foot[..., 0], foot.reach
     toe, roll = foot.ankle + reach, torch.zeros(len(hip))
+    # no heel sinks into the floor: it would take the toes along when it is lifted out of it
+    length, down = reach.norm(dim=-1), -reach[:, 1]
+    lowest = torch.minimum(foot.sole.heights[0] - _DIP - toe[:, 1], down)
+    lowest = ((lowest / length).clamp(-1, 1).arcsin() - (down / length).arcsin()).clamp(min=-_ROLL)
     for _ in range(_ROUNDS):  # Newton's method, damped where a turn hardly changes the length
         arm = -(turn_about(axis, roll) @ reach[..., None])[..., 0]
         leg = toe + arm - hip
         length = leg.norm(dim=-1).clamp(min=1e-6)
         slope = (torch.linalg.cross(axis, arm) * leg).sum(-1) / length
         step = (stretch - length) * slope / (slope**2 + 0.1 * reach.square().sum(-1))
-        roll = (roll + step).clamp(-_ROLL, _ROLL)
+        roll = (roll + step).clamp(max=_ROLL).maximum(lowest)
     return roll, stretch - length
 
 
