@@ -10,7 +10,7 @@ from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import TrainingError
 from motionlab.metrics import speed
 from motionlab.training import prepare
-from motionlab.training.run_on import ALIKE, run_on, strides
+from motionlab.training.run_on import ALIKE, run_on, running, strides
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,8 @@ def last_speed(clip, encoding):
 def test_runs_go_on_and_all_else_ends_as_it_was(runs):
     clips, encoding, normalizer = runs
     short = [clip[:75] for clip in clips]
-    longer, which = run_on(short, encoding, normalizer, 200)
+    longer = run_on(short, encoding, normalizer, 200)
+    which = [bool(running(clip, encoding)[-1]) for clip in short]
     assert any(which) and not all(which)
     fast = [last_speed(clip, encoding) for clip in short]
     assert all(its == (v > 2) for its, v in zip(which, fast, strict=True) if abs(v - 2) > 0.2)
@@ -65,10 +66,20 @@ def test_a_stride_ends_as_it_begins(runs):
 def test_a_run_that_is_long_or_has_no_stride_stays(runs):
     clips, encoding, normalizer = runs
     run = max(clips, key=lambda clip: last_speed(clip, encoding))
-    assert run_on([run], encoding, normalizer, len(run))[0][0] is run
-    assert run_on([run[:12]], encoding, normalizer, 60) == ([pytest.approx(run[:12])], [True])
-    once, again = (run_on([run[:75]], encoding, normalizer, 150, seed=4)[0][0] for _ in "ab")
+    brief = run[:12]
+    assert run_on([run], encoding, normalizer, len(run))[0] is run
+    assert run_on([brief], encoding, normalizer, 60)[0] is brief
+    once, again = (run_on([run[:75]], encoding, normalizer, 150, seed=4)[0] for _ in "ab")
     assert once.equal(again)
+
+
+def test_frames_of_a_run_are_told_by_the_half_second_before(runs):
+    _, encoding, _ = runs
+    clip = torch.zeros(90, encoding.dim)
+    clip[:, 1] = torch.cat([torch.full((30,), 1.0), torch.full((30,), 3.0), torch.zeros(30)]) / 30
+    # the mean of 15 frames passes 2 m/s with the eighth fast one, and falls below it likewise
+    assert running(clip, encoding).nonzero()[:, 0].tolist() == list(range(37, 65))
+    assert running(clip[30:31], encoding).tolist() == [True]
 
 
 def test_the_preset_says_so(smoke):

@@ -45,19 +45,23 @@ def test_draws_are_even():
     assert counts[counts > 0].tolist() == pytest.approx([1000] * 8, abs=150)
 
 
-def test_some_clips_are_drawn_more_often():
-    clips = numbered([5, 9, 30])  # 2, 6 and 27 windows
-    windows = Windows(clips, 4, often=[True, False, False], share=0.25)
+def test_some_frames_are_drawn_more_often():
+    clips = numbered([5, 9, 30])
+    often = [torch.arange(len(clip)) >= 20 for clip in clips]  # windows of 4 from 19 on: 8 of 35
+    windows = Windows(clips, 4, often, share=0.25)
     generator = torch.Generator().manual_seed(0)
     for _ in range(20):
-        assert int((windows.draw(8, generator)[:, 0, 0] == 0).sum()) == 2
+        assert int((windows.draw(8, generator)[:, 0, 1] >= 19).sum()) == 2
     drawn = windows.draw(8000, generator)
-    counts = torch.bincount(drawn[:, 0, 0].long())
-    assert counts.tolist() == pytest.approx([2000, 6000 * 6 / 33, 6000 * 27 / 33], abs=150)
-    for often in (None, [False] * 3):  # the same chance, the same windows
-        plain = Windows(clips, 4, often, share=0.25).draw(8, torch.Generator().manual_seed(1))
+    counts = torch.bincount((40 * drawn[:, 0, 0] + drawn[:, 0, 1]).long())
+    assert counts[80 + 19 :].tolist() == pytest.approx([2000 / 8] * 8, abs=75)
+    assert counts[: 80 + 19][counts[: 80 + 19] > 0].tolist() == pytest.approx(
+        [6000 / 27] * 27, abs=75
+    )
+    for none in (None, [torch.zeros(len(clip)) > 0 for clip in clips]):
+        plain = Windows(clips, 4, none, share=0.25).draw(8, torch.Generator().manual_seed(1))
         assert plain.equal(Windows(clips, 4).draw(8, torch.Generator().manual_seed(1)))
-    alone = Windows(clips, 4, [True] * 3, share=0.25)
+    alone = Windows(clips, 4, [torch.ones(len(clip)) > 0 for clip in clips], share=0.25)
     assert len(alone.draw(8, generator)) == 8
 
 

@@ -13,7 +13,7 @@ from ..errors import TrainingError
 from ..models import LstmGmm, Refiner
 from .checkpoints import load_weights
 from .prepared import Prepared
-from .run_on import run_on
+from .run_on import run_on, running
 from .windows import Windows
 
 Optimizer = Literal["adam", "rmsprop", "sgd"]
@@ -120,7 +120,7 @@ class MixturePreset(Preset):
     """Frames to which training clips that end in a run are brought by repeating their last strides
     (see `run_on.py`); 0: they end where the recording does."""
     runs: float = 0.0
-    """Share of a batch's windows that are of clips that end in a run; 0: as many as there are."""
+    """Share of a batch's windows in which the body runs; 0: as many as there are."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -136,10 +136,12 @@ class MixturePreset(Preset):
 
     def windows(self, data: Prepared, split: str) -> Windows:
         """Windows of a split; in training, with runs that go on."""
-        clips, runs = data.clips(split), None
-        if split == "train" and (self.run_on or self.runs):
-            clips, runs = run_on(clips, data.encoding, data.normalizer, self.run_on)
-        return Windows(clips, self.frames, runs if self.runs else None, self.runs)
+        clips, often = data.clips(split), None
+        if split == "train" and self.run_on:
+            clips = run_on(clips, data.encoding, data.normalizer, self.run_on)
+        if split == "train" and self.runs:
+            often = [running(clip, data.encoding) for clip in clips]
+        return Windows(clips, self.frames, often, self.runs)
 
     def model(self, data: Prepared) -> LstmGmm:
         """An untrained network for some data."""

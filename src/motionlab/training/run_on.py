@@ -17,7 +17,7 @@ from torch import Tensor
 from ..encodings import Encoding, Normalizer
 
 SPEED = 2.0  # m/s over the ground from which we call it a run
-END = 0.5  # seconds at the end of a clip in which a stride may end
+END = 0.5  # seconds over which speed is told; at the end of a clip, in which a stride may end
 STRIDE = (0.4, 1.2)  # seconds of the two steps of a run
 LIKE = 0.15  # seconds over which two moments are compared
 # Root mean square over these, in deviations of the features, up to which two moments are alike.
@@ -29,27 +29,32 @@ FADE = 0.25  # seconds in which a repetition loses the little that it begins bes
 
 def run_on(
     clips: Sequence[Tensor], encoding: Encoding, normalizer: Normalizer, frames: int, seed: int = 0
-) -> tuple[list[Tensor], list[bool]]:
-    """Clips that end in a run, brought to a length by repeating their last strides.
+) -> list[Tensor]:
+    """The same clips, those that end in a run brought to a length by repeating their last strides.
 
     Parameters
     ----------
     clips : features (frames, dim) of `JointAngles`.
     frames : length to which a run is brought; longer ones, and all else, are left as they are.
     seed : of the choice among strides that end alike.
-
-    Returns
-    -------
-    clips : as they are now; runs : which of them end in a run, brought to length or not.
     """
     generator = torch.Generator().manual_seed(seed)
-    found, runs = [], []
+    found = []
     for clip in clips:
-        last = clip[-round(END * encoding.fps) :, :2]  # (frames, 2), steps of the root in metres
-        runs.append(bool(last.norm(dim=-1).mean() * encoding.fps >= SPEED))
-        ways = strides(clip, normalizer, encoding.fps) if runs[-1] and len(clip) < frames else []
+        runs = len(clip) < frames and bool(running(clip, encoding)[-1])
+        ways = strides(clip, normalizer, encoding.fps) if runs else []
         found.append(_repeated(clip, ways, encoding, frames, generator) if ways else clip)
-    return found, runs
+    return found
+
+
+def running(clip: Tensor, encoding: Encoding) -> Tensor:
+    """Which frames (frames,) of features (frames, dim) of `JointAngles` are of a run: by the mean
+    speed of the half second before each."""
+    steps = clip[:, :2].norm(dim=-1)  # metres over the ground since the frame before
+    last = torch.arange(1, len(clip) + 1)
+    first = (last - round(END * encoding.fps)).clamp(min=0)
+    so_far = torch.cat([torch.zeros(1), steps.cumsum(0)])
+    return (so_far[last] - so_far[first]) / (last - first) * encoding.fps >= SPEED
 
 
 def strides(clip: Tensor, normalizer: Normalizer, fps: float) -> list[tuple[int, int]]:

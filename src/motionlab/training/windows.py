@@ -17,8 +17,9 @@ class Windows:
     ----------
     clips : list of (frames, dim).
     frames : length of a window.
-    often : which clips are drawn more often than their length asks for; None: none is.
-    share : of the windows that are drawn, those of these clips.
+    often : which frames (frames,) of each clip are to be seen more often than they are recorded;
+        None: none is.
+    share : of the windows that are drawn, those of which more than half are such frames.
 
     Raises
     ------
@@ -29,7 +30,7 @@ class Windows:
         self,
         clips: Sequence[Tensor],
         frames: int,
-        often: Sequence[bool] | None = None,
+        often: Sequence[Tensor] | None = None,
         share: float = 0.0,
     ) -> None:
         lengths = [len(clip) for clip in clips]
@@ -42,9 +43,11 @@ class Windows:
         ends = torch.tensor(lengths).cumsum(0).tolist()
         spans = [range(end - n, end - frames + 1) for end, n in zip(ends, lengths, strict=True)]
         starts = torch.tensor([start for span in spans for start in span])
-        which = [bool(often and often[i]) for i, span in enumerate(spans) for _ in span]
-        which = torch.tensor(which, dtype=torch.bool)
-        self._often, self._share = starts[which], share if not which.all() else 1.0
+        which = torch.zeros(len(starts), dtype=torch.bool)
+        if often is not None:
+            so_far = torch.cat([torch.zeros(1), torch.cat(list(often)).cumsum(0)])
+            which = so_far[starts + frames] - so_far[starts] > frames / 2
+        self._often, self._share = starts[which], 1.0 if which.all() else share
         self._other = starts[~which]
         # one after the other, the last one moved back so that it ends with the clip
         tiles = [start for span in spans if span for start in {*span[::frames], span[-1]}]
