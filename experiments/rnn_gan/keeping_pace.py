@@ -80,9 +80,7 @@ def told(model: nn.Module, begun: Tensor, speeds: Tensor, gait: str, sampling: d
         for _, features in rollouts.sampled(
             model, begun, round(SPANS[-1][1] * fps), seed, **sampling
         ):
-            for motion in features:
-                points = rollouts.points_of(model.encoding, motion)
-                ratios.append(metrics.speed(points, fps))
+            ratios += [_speed(model, motion) for motion in features]
     ratios = torch.stack(ratios) / speeds.repeat(len(SEEDS))[:, None]  # (samples, frames)
     spans, verdicts = {}, []
     for first, last in SPANS:
@@ -103,6 +101,15 @@ def told(model: nn.Module, begun: Tensor, speeds: Tensor, gait: str, sampling: d
         "spans": spans,
         "keeps its pace": all(verdicts),
     }
+
+
+def _speed(model: nn.Module, features: Tensor) -> Tensor:
+    """Speed (frames,) in m/s of one motion (frames, dim); NaN from where it is no motion any more."""
+    whole = int(features.isfinite().all(-1).cumprod(0).sum())
+    speed = torch.full(features.shape[:1], torch.nan)
+    if whole > 1:
+        speed[:whole] = metrics.speed(model.encoding.positions(features[:whole]), model.fps)
+    return speed
 
 
 if __name__ == "__main__":
