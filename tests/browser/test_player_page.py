@@ -5,10 +5,12 @@ from __future__ import annotations
 import shutil
 from contextlib import contextmanager
 from dataclasses import replace
+from io import BytesIO
 
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from motionlab import Motion, Skeleton
 from motionlab.viewer.live.knobs import knobs
@@ -109,6 +111,38 @@ def test_it_plays_scrubs_and_listens_to_keys(browser, page_file):
         page.keyboard.press("r")
         page.keyboard.press(" ")
         assert figure.evaluate("figure => figure.motionlab.playing")
+
+
+def test_a_body_of_any_size_fills_the_view(browser, page_file):
+    """Metres read as centimetres, and the other way round: all alike but for what the lines tell."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOTIONLAB_VIEWER", "page")
+        sizes = [scaled(waving(), factor) for factor in (1, 0.01, 100)]
+        figures = [show(motion, trail="left_hand", height=240) for motion in sizes]
+    file = page_file.with_name("sizes.html")
+    file.write_text(PAGE.format("".join(figure.html for figure in figures)), encoding="utf-8")
+    with opened(browser, file, reduced_motion="reduce") as page:
+        pictures = []
+        for figure in page.locator("figure.motionlab-player").all():
+            figure.scroll_into_view_if_needed()
+            figure.get_by_label("Frame").fill("100")
+            page.add_style_tag(content=".ml-scale { opacity: 0 }")
+            pictures.append(
+                np.array(Image.open(BytesIO(picture(page, figure))).convert("L"), float)
+            )
+        assert pictures[0].min() < 0.5 * pictures[0].max()
+        for other in pictures[1:]:
+            assert (np.abs(other - pictures[0]) > 10).mean() < 0.002
+        assert page.locator(".ml-scale").all_inner_texts() == [
+            "Lines on the floor: every 5 mm",
+            "Lines on the floor: every 50 m",
+        ]
+
+
+def scaled(motion: Motion, factor: float) -> Motion:
+    body = motion.skeleton
+    other = replace(body, offsets=factor * body.offsets, end_offsets=factor * body.end_offsets)
+    return replace(motion, skeleton=other, root_positions=factor * motion.root_positions)
 
 
 def test_dragging_turns_the_view(browser, page_file):

@@ -184,6 +184,20 @@ def test_its_figure_is_that_of_write_gltf(opened, walk, tmp_path, rest):
         assert np.abs(a.max(0) - b.max(0)).max() < 0.01
 
 
+def test_a_tiny_body_is_saved_as_small_as_it_is(opened, walk, tmp_path):
+    body = walk.skeleton
+    body = replace(body, offsets=0.01 * body.offsets, end_offsets=0.01 * body.end_offsets)
+    small = replace(walk, skeleton=body, root_positions=0.01 * walk.root_positions)
+    page = opened(player(small))
+    page.get_by_role("button", name="Save as a file").click()
+    content, numbers = read_glb(save(page, f"{walk.name}.glb", tmp_path))
+    assert "root to 0.001 mm" in page.locator(".ml-saving small").inner_text()
+    mesh = vertices(content, numbers, 25)
+    points = small.positions()[25].numpy()
+    assert np.abs(mesh.min(0) - points.min(0)).max() < 0.002
+    assert np.abs(mesh.max(0) - points.max(0)).max() < 0.002
+
+
 def folded(motion):
     """The same movement on a rig whose rest pose has the legs folded up."""
     skeleton = motion.skeleton

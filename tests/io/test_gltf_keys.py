@@ -54,7 +54,7 @@ def test_ways_from_key_to_key(read):
         check(gltf, read(gltf))
 
 
-@pytest.mark.parametrize("rate", [10, 24, 29.97, 30, 59.94, 60, 120, 240])
+@pytest.mark.parametrize("rate", [1, 4, 5, 7.5, 10, 24, 29.97, 30, 59.94, 60, 120, 240])
 def test_the_rate_is_that_of_the_keys(rate, read):
     gltf = chain()
     times = 300.04 + np.arange(6 * 40) / rate  # where float32 is rounded to 0.03 ms
@@ -87,6 +87,23 @@ def test_poses_at_no_rate_are_told(times, read):
     assert motion.fps == 30 and len(motion) == round(times[-1] * 30) + 1
     check(gltf, motion)
     assert len(read(gltf, fps=2)) == int(times[-1] * 2) + 1
+
+
+@pytest.mark.parametrize(
+    "rate, keys, way", [(5, 40, "CUBICSPLINE"), (6, 9, "LINEAR"), (0.5, 40, "STEP")]
+)
+def test_even_keys_that_may_be_poses_are_told(rate, keys, way, read):
+    """What lies between poses counts."""
+    gltf = chain()
+    values = Rotation.random(keys, random_state=3).as_quat()
+    values = np.repeat(values, 3, axis=0) if way == "CUBICSPLINE" else values
+    gltf.animate({(0, "rotation"): (np.arange(keys) / rate, values, way)})
+    words = rf"come as poses do, {rate} per second; .* at 30 frames .* pass {rate}, .* as fps="
+    with pytest.warns(UserWarning, match=words):
+        motion = read(gltf)
+    assert (motion.fps, len(motion)) == (30, round((keys - 1) * 30 / rate) + 1)
+    check(gltf, motion)
+    assert len(read(gltf, fps=rate)) == keys
 
 
 def test_one_key_is_one_frame(read):

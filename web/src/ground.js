@@ -2,6 +2,7 @@
 // the camera's target while its lines stay where they are in the world.
 import { Color, Group, Mesh, PlaneGeometry, ShaderMaterial, ShadowMaterial } from "three";
 
+export const LINES = 0.5; // metres from line to line; every second one is strong
 const RADIUS = 14; // metres until the floor has faded
 
 const vertexShader = `
@@ -25,7 +26,7 @@ const fragmentShader = `
   void main() {
     float reach = length(world.xz - middle.xz) / ${RADIUS.toFixed(1)};
     float fade = 1.0 - smoothstep(0.15, 1.0, reach);
-    float grid = max(0.38 * line(world.xz * 2.0, 0.004), line(world.xz, 0.006));
+    float grid = max(0.38 * line(world.xz * ${(1 / LINES).toFixed(1)}, 0.004), line(world.xz * ${(0.5 / LINES).toFixed(1)}, 0.006));
     gl_FragColor = vec4(mix(floorColor, lineColor, grid), fade);
     #include <colorspace_fragment>
   }`;

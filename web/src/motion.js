@@ -3,7 +3,7 @@ import { fitted } from "./fit.js";
 import { fromEuler, matrices, place } from "./kinematics.js";
 
 const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
-const ROOT_UNIT = 1e-4; // metres
+export const ROOT_UNIT = 1e-4; // metres
 const TURN_UNIT = Math.PI / 2 ** 15; // radians: the sixteen bits of a number go round as an angle does
 const SMOOTH = 0.45; // seconds on each side over which the followed path is averaged
 
@@ -27,10 +27,10 @@ export function fromFewBytes(sent, frames, width) {
 
 /** One motion: what was sent is worked out at the start, frames in between when they are drawn. */
 export class Track {
-  /** `data`: a track of the payload, and what is said of its body. */
-  constructor(data, stride, fps) {
+  /** `data`: a track of the payload, and what is said of its body. All is magnified but the skeleton. */
+  constructor(data, stride, fps, magnified = 1) {
     const { label, name, color, skeleton, middle, bones, extras, contactPoints } = data;
-    Object.assign(this, { label, name, color, skeleton, middle, bones, extras, contactPoints });
+    Object.assign(this, { label, name, color, skeleton, middle, bones, extras, contactPoints, magnified });
     this.stride = stride; // motion frames from one stored frame to the next
     this.stored = data.frames;
     this.rate = fps / stride; // stored frames in a second
@@ -52,7 +52,7 @@ export class Track {
 
   /** Points of a motion that was sent as rotations; `root`, which was the root joint's, becomes the middle's. */
   turnedPoints() {
-    const { skeleton, middle, pointCount, root, angles } = this;
+    const { skeleton, middle, pointCount, root, angles, magnified } = this;
     const [locals, turns] = [matrices(skeleton), matrices(skeleton)];
     const points = new Float64Array(3 * pointCount);
     const local = new Float32Array(this.stored * points.length);
@@ -62,8 +62,8 @@ export class Track {
         fromEuler([angles[at] * TURN_UNIT, angles[at + 1] * TURN_UNIT, angles[at + 2] * TURN_UNIT], skeleton.orders[joint], matrix);
       });
       place(skeleton, [0, 0, 0], locals, turns, points);
-      for (let i = 0; i < points.length; i++) local[frame * points.length + i] = points[i] - points[3 * middle + (i % 3)];
-      for (let axis = 0; axis < 3; axis++) root[3 * frame + axis] += points[3 * middle + axis];
+      for (let i = 0; i < points.length; i++) local[frame * points.length + i] = magnified * (points[i] - points[3 * middle + (i % 3)]);
+      for (let axis = 0; axis < 3; axis++) root[3 * frame + axis] += magnified * points[3 * middle + axis];
     }
     return local;
   }
@@ -77,10 +77,10 @@ export class Track {
     return { skeleton, fps, root, angles: Array.from(angles, (steps) => steps * TURN_UNIT) };
   }
 
-  /** All points of a stored frame in the world. */
+  /** All points of a stored frame in the world, as large as they are. */
   whole(frame) {
     const width = 3 * this.pointCount;
-    return Float64Array.from({ length: width }, (_, i) => this.root[3 * frame + (i % 3)] + this.local[frame * width + i]);
+    return Float64Array.from({ length: width }, (_, i) => (this.root[3 * frame + (i % 3)] + this.local[frame * width + i]) / this.magnified);
   }
 
   /** Fill `points` (metres) for a frame of the motion; frames between stored ones are mixed. */
@@ -198,5 +198,5 @@ function drawn({ bones, extras, pointCount }) {
 
 export function decode(payload) {
   if (payload.version !== 2) throw new Error(`motion payload of version ${payload.version}; this player reads 2`);
-  return payload.tracks.map((data) => new Track({ ...payload.bodies[data.body], ...data }, payload.stride, payload.fps));
+  return payload.tracks.map((data) => new Track({ ...payload.bodies[data.body], ...data }, payload.stride, payload.fps, payload.magnified));
 }

@@ -3,8 +3,9 @@ import { Bar } from "./bar.js";
 import { Orbit } from "./camera.js";
 import { Clock } from "./clock.js";
 import { Mannequin } from "./mannequin.js";
+import { LINES } from "./ground.js";
 import { Contacts, disposeAll, Path, Trail } from "./marks.js";
-import { decode } from "./motion.js";
+import { decode, ROOT_UNIT } from "./motion.js";
 import { addStyle } from "./style.js";
 import { sharedStage } from "./stage.js";
 import { currentTheme, THEMES, watchTheme } from "./theme.js";
@@ -59,12 +60,21 @@ export class Player {
     this.labels.className = "ml-labels";
     this.labels.setAttribute("aria-hidden", "true");
     this.view.append(this.canvas, this.labels);
+    if (this.magnified !== 1) this.view.append(this.sayScale());
     this.bar = new Bar(this, frames, fps, this.several);
     this.host.append(this.view, this.bar.element);
     this.orbit = new Orbit(this.canvas, !REDUCED?.matches);
     this.orbit.controls.addEventListener("change", () => { this.dirty = true; });
     this.view.addEventListener("keydown", (event) => this.key(event));
     this.lookFromStart();
+  }
+
+  /** A magnified body looks as any other: the lines on the floor tell how large it is. */
+  sayScale() {
+    const note = document.createElement("p");
+    note.className = "ml-scale";
+    note.textContent = `Lines on the floor: every ${inWords(LINES / this.magnified)}`;
+    return note;
   }
 
   watch() {
@@ -155,13 +165,16 @@ export class Player {
     this.scrub(0);
   }
 
+  /** How many times larger than they are bodies are drawn. */
+  get magnified() { return this.payload.magnified ?? 1; }
+
   /** The tracks that can be saved: all that can be seen now. */
   get saved() { return this.payload.choose ? [this.tracks[this.chosen]] : this.tracks; }
 
   /** What a saved file holds, in words. */
   get savedHow() {
     const [track] = this.tracks;
-    const exact = track.angles ? "root to 0.1 mm, joints to 0.01°." : TWIST;
+    const exact = track.angles ? `root to ${inWords(ROOT_UNIT / this.magnified)}, joints to 0.01°.` : TWIST;
     return `${Number(track.rate.toPrecision(4))} frames a second, ${exact}`;
   }
 
@@ -341,6 +354,12 @@ export class Player {
     this.orbit.dispose();
     for (const actor of this.casts?.flat() ?? []) disposeAll(actor);
   }
+}
+
+/** A length in metres. */
+function inWords(length) {
+  const [size, unit] = length < 0.01 ? [1000 * length, "mm"] : length < 1 ? [100 * length, "cm"] : [length, "m"];
+  return `${Number(size.toPrecision(3))} ${unit}`;
 }
 
 /** Columns that give the views the most upright, yet not too narrow, shape. */

@@ -71,16 +71,21 @@ function node(object, name, position) {
   return object;
 }
 
-/** The figure as a mesh, put on in the pose in which the nodes are; lifts both onto the floor. */
+/**
+ * The figure as a mesh, put on in the pose in which the nodes are; lifts both onto the floor. It is made
+ * as large as it is drawn.
+ */
 function skinned(track, skeleton, points, name) {
+  const { magnified = 1 } = track;
   const places = new Float32Array(3 * (points.length + track.extras.length));
-  points.forEach((point, i) => places.set(point.getWorldPosition(new Vector3()).toArray(), 3 * i));
+  points.forEach((point, i) => places.set(point.getWorldPosition(new Vector3()).multiplyScalar(magnified).toArray(), 3 * i));
   addExtras(places, points.length, track.extras);
   const place = (point) => places.subarray(3 * point, 3 * point + 3);
   const figure = new Mannequin({ bones: track.bones, color: track.color, seek() {}, point: place });
   figure.update();
   const { geometry } = figure;
   carry(geometry, track, skeleton, place);
+  geometry.scale(1 / magnified, 1 / magnified, 1 / magnified);
   geometry.computeBoundingBox();
   const lift = -geometry.boundingBox.min.y;
   geometry.translate(0, lift, 0);

@@ -57,8 +57,9 @@ def read_gltf(
     path : the file. Others that a ``.gltf`` names must lie in its folder, or below it.
     animation : the one to read, by name or number from 0; needed where several move the body.
     units, up : as of `read_bvh`, for files that are not in metres with y up, as glTF asks for.
-    fps : frames per second of the motion. None takes the rate at which the keys come, and 30, with
-        a warning, where they come at none.
+    fps : frames per second of the motion. None takes the rate at which the keys come, 5 if they do
+        evenly. It takes 30, with a warning, where they come at none, and where they are poses:
+        fewer than 10 a second, joined by curves or not even 10 in all.
     root : the node to begin with, by its name, of a file that holds several bodies.
     rigid : "mean" reads joints that slide against their parents, or are moved by a scale that
         changes, at their mean offset, and says how much that moves them; None refuses them if they

@@ -16,8 +16,11 @@ _WAYS = ("LINEAR", "STEP", "CUBICSPLINE")
 _SAME = 5e-4  # seconds; keys that are nearer to each other are one frame's
 _FLOAT32 = 2.0**-22  # share of a time by which its rounding may be off
 _DEFAULT = 30.0
-# Frames per second of what was recorded, or exported frame by frame; fewer keys are poses.
-_SLOWEST, _FASTEST = 10.0, 1000.0
+# Frames per second of what was recorded, or exported frame by frame.
+_SLOWEST, _FASTEST = 1.0, 1000.0
+# Keys that come more slowly are poses, and what lies between them counts, where curves join them or
+# they are few: any two keys are even.
+_POSES, _FEW = 10.0, 10
 _MOSTLY = 0.5  # of the frames that have a key; exporters leave out what interpolation gives
 # Share of a frame by which keys may miss it: by the rounding of float32, and of milliseconds.
 _ROUNDED, _COARSE = 0.01, 0.05
@@ -143,7 +146,7 @@ def frames(
     keys = np.unique(np.concatenate([track.times for track in moves]))
     doubt, near = None, _FLOAT32 * np.abs(keys).max()
     if fps is None:
-        fps, doubt = _rate(keys)
+        fps, doubt = _rate(keys, any(track.way == "CUBICSPLINE" for track in moves))
         near = near if doubt else _COARSE / fps
     span = keys[-1] - keys[0]
     if span * fps > _MOST:
@@ -157,20 +160,26 @@ def frames(
     return np.where(np.abs(nearest - when) < near, nearest, when), float(fps), doubt
 
 
-def _rate(keys: np.ndarray) -> tuple[float, str | None]:
-    """The rate at whose frames all keys lie, where there is one and most frames have a key."""
+def _rate(keys: np.ndarray, curved: bool) -> tuple[float, str | None]:
+    """The rate at whose frames all keys lie, where there is one and most frames have a key; or
+    another, and what to say of it."""
     keys = keys[np.diff(keys, prepend=-np.inf) > _SAME] - keys[0]
     if len(keys) == 1:
         return _DEFAULT, None
     gaps = np.diff(keys)
     gap = gaps[gaps < _ALIKE * gaps.min()].mean()
     rate = round(keys[-1] / gap) / keys[-1]
+    how, other = "at no even rate", "another rate"
     for fps, near in [(rate, _ROUNDED), *((usual, _COARSE) for usual in RATES)]:
         at = keys * fps
         even = np.abs(at - at.round()).max() < near
-        if even and _SLOWEST <= fps <= _FASTEST and len(keys) > _MOSTLY * at[-1]:
+        if not even or fps > _FASTEST or len(gaps) <= _MOSTLY * at[-1]:
+            continue
+        if fps >= (_POSES if curved or len(keys) < _FEW else _SLOWEST):
             return whole(fps), None
+        how, other = f"as poses do, {fps:.4g} per second", f"{fps:.4g}, for these alone,"
+        break
     return _DEFAULT, (
-        f"the keys of its animation come at no even rate, or at less than {_SLOWEST:g} per second; "
-        f"it is read at {_DEFAULT:g} frames per second, interpolated: pass another as fps=."
+        f"the keys of its animation come {how}; it is read at {_DEFAULT:g} frames per second, "
+        f"interpolated: pass {other} as fps=."
     )

@@ -98,6 +98,33 @@ def test_the_file_is_that_of_write_bvh(page, walk, tmp_path):
     assert np.abs(points - walk.positions().numpy()).max() < 3e-4
 
 
+@pytest.mark.parametrize("factor", [0.01, 0.004, 100])
+@pytest.mark.parametrize("track", [whole, points_of])
+def test_a_body_of_no_persons_size_is_drawn_as_a_person_and_saved_as_it_is(
+    page, walk, factor, track
+):
+    small = scaled(walk, factor)
+    points, text = page(track(small))
+    sent = payload([track(small)], 30.0)
+    assert sent["magnified"] == pytest.approx(200 if factor == 0.004 else 1 / factor)
+    drawn = scaled(walk, factor * sent["magnified"])
+    assert np.abs(points - drawn.positions().numpy()).max() < 5e-4
+    usual = payload([track(drawn)], 30.0)
+    assert usual["magnified"] == 1
+    assert sent["floor"] == pytest.approx(usual["floor"], abs=2e-4)
+    radii = [np.array(one["bodies"][0]["bones"]) for one in (sent, usual)]
+    np.testing.assert_allclose(*radii, atol=1e-3)
+    with pytest.warns(UserWarning, match="no person"):
+        saved = parse_bvh(text.encode(), "page")
+    assert (saved.positions() - small.positions()).norm(dim=-1).max() < 1e-3 * factor
+
+
+def scaled(motion: Motion, factor: float) -> Motion:
+    body = motion.skeleton
+    other = replace(body, offsets=factor * body.offsets, end_offsets=factor * body.end_offsets)
+    return replace(motion, skeleton=other, root_positions=factor * motion.root_positions)
+
+
 @settings(deadline=None, max_examples=5)
 @given(seed=st.integers(0, 2**20))
 def test_any_rig_in_any_order_of_rotations(page, walk, seed):

@@ -4,6 +4,9 @@ A built page has no kernel, so the motion itself travels in it, and can be saved
 root's place to a tenth of a millimetre, and every joint's angles to half of 360° / 2^16. Where only
 points are known, they are sent, to a tenth of a millimetre, relative to the root. Numbers are sent as
 changes of their changes: a body moves on as it moved, so that most of them fit one byte.
+
+A body that is no person's size, such as metres read as centimetres, is sent magnified, its way and
+its floor with it, so that all of this, light and camera are right for it, too; `magnified`.
 """
 
 from __future__ import annotations
@@ -11,8 +14,9 @@ from __future__ import annotations
 import base64
 import html
 import json
+import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,34 +90,51 @@ def payload(
     options : height, follow, overlay, autoplay, speed; choose, the name of a slider over the tracks,
         of which one is seen at a time, and chosen, which is at first.
 
-    Every ``stride``-th frame is stored, so that at least `SHOWN_FPS` a second are; ``frames`` and
+    Places, lengths and radii are ``magnified`` times what they are, but for the skeletons, which
+    are saved. Every ``stride``-th frame is stored, so that at least `SHOWN_FPS` a second are; ``frames`` and
     the player's clock count the motion's own frames.
     """
     stride = max(1, int(fps / SHOWN_FPS + 1e-3))
     bodies: list[dict[str, Any]] = []  # that tracks share
+    times = magnified(track.skeleton for track in tracks)
     return {
         "version": 2,
         "fps": fps,
         "frames": max(len(track.positions) for track in tracks),
         "stride": stride,
-        "tracks": [_pack(track, stride, bodies) for track in tracks],
+        "magnified": times,
+        "tracks": [_pack(track, stride, bodies, times) for track in tracks],
         "bodies": bodies,
-        "paths": list(paths),
+        "paths": [{**path, "points": _times(times, path["points"])} for path in paths],
         "trail": [int(point) for point in trail],
-        "floor": floor_height(tracks[0]),
+        "floor": floor_height(tracks[0], times),
         **options,
     }
 
 
-def floor_height(track: Track) -> float:
-    """Height in metres where the soles are in all but the lowest 2 % of the frames.
+def magnified(skeletons: Iterable[Skeleton]) -> float:
+    """How many times larger a page shows bodies that it shows together: 1 for people, from infants
+    to giants; else 1, 2 or 5 times a power of ten, the nearest that makes the largest an adult."""
+    size = max(body(skeleton).size for skeleton in skeletons)
+    tens = 10.0 ** -round(math.log10(size))
+    if tens == 1:
+        return 1.0
+    return min(
+        (tens * by for by in (0.2, 0.5, 1, 2, 5)), key=lambda times: abs(math.log(times * size))
+    )
+
+
+def floor_height(track: Track, times: float = 1.0) -> float:
+    """Height in metres, of the body `times` as large, where the soles are in all but the lowest 2 % of the frames.
 
     Sources put y = 0 some centimetres above or below the sole. A motion whose lowest point is
     farther from it than that (a jump, a drifting model) keeps its floor at 0.
     """
     dress = body(track.skeleton)
-    points = dress.points(track.positions)[..., 1]
-    ends = [(end, radius) for a, b, ra, rb in dress.bones for end, radius in ((a, ra), (b, rb))]
+    points = times * dress.points(track.positions)[..., 1]
+    ends = [
+        (end, times * radius) for a, b, ra, rb in dress.bones for end, radius in ((a, ra), (b, rb))
+    ]
     if not ends:
         return 0.0
     index, radius = zip(*ends, strict=True)
@@ -122,8 +143,9 @@ def floor_height(track: Track) -> float:
     return round(sole, 4) if abs(sole) < FLOOR_SLACK else 0.0
 
 
-def dressed(skeleton: Skeleton) -> dict[str, Any]:
-    """A body as the page knows it: its skeleton, to be saved, and its figure, to be drawn."""
+def dressed(skeleton: Skeleton, times: float = 1.0) -> dict[str, Any]:
+    """A body as the page knows it: its skeleton, to be saved, and its figure, to be drawn `times`
+    as large."""
     dress = body(skeleton)
     return {
         "skeleton": {
@@ -137,22 +159,28 @@ def dressed(skeleton: Skeleton) -> dict[str, Any]:
         },
         "middle": skeleton.roles.get("hips", 0),
         "extras": [list(extra) for extra in dress.extras],
-        "bones": [list(bone) for bone in dress.bones],
+        "bones": [[a, b, *_times(times, radii)] for a, b, *radii in dress.bones],
         "contactPoints": list(dress.feet),
     }
+
+
+def _times(times: float, numbers: Any) -> Any:
+    return numbers if times == 1 else (times * np.asarray(numbers)).tolist()
 
 
 def _in_micrometres(offsets: Tensor) -> list[list[float]]:
     return offsets.double().numpy().round(6).tolist()
 
 
-def _pack(track: Track, stride: int, bodies: list[dict[str, Any]]) -> dict[str, Any]:
+def _pack(track: Track, stride: int, bodies: list[dict[str, Any]], times: float) -> dict[str, Any]:
     """What is sent of a track; its body is added to `bodies` unless it is there."""
-    dress, drawn = dressed(track.skeleton), body(track.skeleton)
+    dress, drawn = dressed(track.skeleton, times), body(track.skeleton)
     if dress not in bodies:
         bodies.append(dress)
     numbers = (
-        _points(track, stride, drawn) if track.motion is None else _turns(track.motion, stride)
+        _points(track, stride, drawn, times)
+        if track.motion is None
+        else _turns(track.motion, stride, times)
     )
     return {
         "label": track.label,
@@ -165,8 +193,9 @@ def _pack(track: Track, stride: int, bodies: list[dict[str, Any]]) -> dict[str, 
     }
 
 
-def _points(track: Track, stride: int, dress: Body) -> dict[str, Any]:
-    root, local, scale = quantise(track.positions[::stride].numpy(), track.skeleton, dress)
+def _points(track: Track, stride: int, dress: Body, times: float) -> dict[str, Any]:
+    positions = times * track.positions[::stride].numpy()
+    root, local, scale = quantise(positions, track.skeleton, dress)
     return {
         "root": _base64(root, "<i4"),
         "local": _base64(in_few_bytes(local), "u1"),
@@ -174,8 +203,9 @@ def _points(track: Track, stride: int, dress: Body) -> dict[str, Any]:
     }
 
 
-def _turns(motion: Motion, stride: int) -> dict[str, Any]:
+def _turns(motion: Motion, stride: int, times: float) -> dict[str, Any]:
     root_positions, rotations = (values[::stride] for values in motion.numpy())
+    root_positions = times * root_positions
     root = np.rint(root_positions.astype(np.float64) / ROOT_UNIT)
     if np.abs(root).max() > FARTHEST:
         warnings.warn(

@@ -47,6 +47,9 @@ def show(
     least 30 frames a second, the root to 0.1 mm, joints to 0.01 degrees. Of point positions only how
     bones lie is known, not how they are twisted, and they keep the skeleton's lengths.
 
+    A body of no person's size is drawn magnified, its floor and its way with it, and the player tells
+    how far apart the floor's lines are. Bodies that are shown together are magnified alike.
+
     Parameters
     ----------
     motion : a `Motion`, point positions (frames, points, 3) in metres, or a list of either. Points

@@ -61,6 +61,7 @@ class Body:
 
     ``head`` is the index, within ``bones``, of the skull (None if no head was recognised);
     ``feet`` the points to mark for the contacts left heel, left toe, right heel, right toe;
+    ``size`` how large it is beside an adult, by its legs, or by its reach where it has none;
     ``magnified`` how many times larger a picture shows a body that is too small for one, such as
     metres read as centimetres; 1 for all others.
     """
@@ -69,6 +70,7 @@ class Body:
     bones: tuple[Bone, ...]
     head: int | None
     feet: tuple[int, ...]
+    size: float = 1.0
     magnified: float = 1.0
 
     def points(self, positions: Tensor) -> Tensor:
@@ -113,7 +115,8 @@ class _Tailor:
         self._hands()
         feet, head = self._feet(), self._head()
         bones = (Bone(a, b, *(r / self.magnified for r in radii)) for a, b, *radii in self.bones)
-        return Body(tuple(self.extras), tuple(bones), head, feet, self.magnified)
+        size = self.size / self.magnified
+        return Body(tuple(self.extras), tuple(bones), head, feet, size, self.magnified)
 
     def _limb(self, parent: int, point: int) -> None:
         role = self._nearest_role(parent)
