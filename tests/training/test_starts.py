@@ -5,8 +5,9 @@ from dataclasses import replace
 import pytest
 import torch
 
+from motionlab.datasets import gaits as procedural
 from motionlab.errors import TrainingError
-from motionlab.training.starts import Start, before_starts, candidates, choose
+from motionlab.training.starts import Start, before_starts, candidates, changes, choose
 
 
 def only(data, wanted):
@@ -44,8 +45,25 @@ def test_a_single_clip_gives_several():
 def test_frames_before_a_start_are_those_of_its_clip(gaits):
     before, names = before_starts(gaits, 30.0)
     assert before.shape == (len(names), 30, gaits.encoding.dim)
-    for start, seen in zip(choose(candidates(gaits)), before, strict=True):
+    chosen = choose(candidates(gaits)) + changes(gaits)
+    assert [start.name for start in chosen] == names
+    for start, seen in zip(chosen, before, strict=True):
         assert torch.equal(seen, gaits.clips("val")[start.clip][start.frame - 30 : start.frame])
+
+
+def test_changes_come_last_each_once_and_where_there_are_none_none_is_missed(gaits):
+    speed = lambda time: 1.2 * (time > 3) + 1.8 * (time > 7)
+    clip = procedural.make(seconds=12, speed=speed, seed=1)
+    clips = [clip, clip.mirror(), procedural.make(seconds=4, speed=1.2, seed=1)]
+    rows = [gaits.encoding.encode(one) for one in clips]
+    data = replace(
+        gaits, features=torch.cat(rows), lengths=torch.tensor([len(row) for row in rows]),
+        names=("x/a", "x/b", "x/c"), splits=("val",) * 3,
+    )  # fmt: skip
+    _, names = before_starts(data, 30.0)
+    assert names[-2:] == ["stand to walk", "walk to run"] and len(set(names)) == len(names)
+    assert not changes(only(data, lambda name: name == "x/c"))
+    assert len(before_starts(only(data, lambda name: name == "x/c"), 30.0)[1]) > 0
 
 
 @pytest.mark.parametrize(("frames", "seen"), [(12, 12), (45, 30)])

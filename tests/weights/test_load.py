@@ -16,7 +16,7 @@ from motionlab import contacts, metrics, weights
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import LstmGmm
 from motionlab.training.checkpoints import load_weights, save_weights
-from motionlab.training.starts import candidates, choose
+from motionlab.training.starts import candidates, changes, choose
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_shipped_weights_are_ready_to_generate(model):
 
 
 def test_starts_are_states_that_the_rounded_network_reaches(model, gaits):
-    found = choose(candidates(gaits.data))
+    found = choose(candidates(gaits.data)) + changes(gaits.data)
     assert tuple(start.name for start in found) == model.start_names
     clips = gaits.data.clips("val")
     for index, start in enumerate(found):

@@ -1,4 +1,7 @@
-"""Moments to start from, of the validation clips: each named by what follows it, or by its clip."""
+"""Moments to start from, of the validation clips: each named by what follows it, or by its clip.
+
+What follows is a gait, or a change of it that has just begun (`training.changes`).
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from torch import Tensor
 from ..encodings import RootRelative
 from ..errors import TrainingError
 from ..feet import contacts
+from .changes import NAMES, changing
 from .dances import DanceWindows
 from .prepared import Prepared
 
@@ -51,6 +55,16 @@ class Start:
         return f"{self.gait}{speed}{TURNS[self.turn]}"
 
 
+@dataclass(frozen=True)
+class Change:
+    """A moment in a clip at which something else has just begun: the name says what."""
+
+    clip: int
+    frame: int  # the first that the network has not seen
+    name: str
+    share: float  # of the change, seen before it
+
+
 def before_starts(data: Prepared, fps: float) -> tuple[Tensor, list[str]]:
     """What a network sees before it goes on: a second (starts, frames, dim) each, and names.
 
@@ -62,7 +76,7 @@ def before_starts(data: Prepared, fps: float) -> tuple[Tensor, list[str]]:
     """
     if isinstance(data.encoding, RootRelative):
         return of_dances(data, fps)
-    chosen, seen = choose(candidates(data)), round(OBSERVED * fps)
+    chosen, seen = choose(candidates(data)) + changes(data), round(OBSERVED * fps)
     if not chosen:
         return of_clips(data, seen)
     clips = data.clips("val")
@@ -113,6 +127,21 @@ def choose(found: list[Start]) -> list[Start]:
                 nearest = (speeds - speeds.quantile(quantile)).abs().argmin()
                 chosen.append(some[nearest])
     return chosen
+
+
+def changes(data: Prepared) -> list[Change]:
+    """Of each kind of change that the validation clips hold, the moment that sees least of it."""
+    encoding, freshest = data.encoding, {}
+    for number, clip in enumerate(data.clips("val")):
+        points = encoding.positions(clip)
+        for name, shares in changing(points, encoding.skeleton, encoding.fps).items():
+            if not shares.isfinite().any():
+                continue
+            frame = int(shares.nan_to_num(torch.inf).argmin())
+            found = Change(number, frame, name, float(shares[frame]))
+            if name not in freshest or found.share < freshest[name].share:
+                freshest[name] = found
+    return [freshest[name] for name in NAMES if name in freshest]
 
 
 def of_clips(data: Prepared, seen: int) -> tuple[Tensor, list[str]]:
