@@ -265,6 +265,25 @@ def test_a_head_on_top_of_its_neck_has_a_skull_above_the_spine():
     assert 0.03 < jaw < crown < 0.15
 
 
+def test_toes_without_a_tip_lie_on_the_floor():
+    """As files from Blender come, which has no end sites: such a body stood on tiptoe."""
+    whole, bare = CANONICAL, CANONICAL.without_end_sites()
+    soles, tips = [], []
+    for skeleton in (whole, bare):
+        dress = body(skeleton)
+        points = dress.points(standing(1, skeleton=skeleton).positions())[0]
+        low = [min(points[b.a, 1] - b.radius_a, points[b.b, 1] - b.radius_b) for b in dress.bones]
+        soles.append(min(low))
+        toes = skeleton.role("left_toes")
+        (tip,) = (b.b for b in dress.bones if b.a == toes)
+        tips.append(points[tip] - points[toes])
+    assert abs(soles[0] - soles[1]) < 0.01
+    assert abs(tips[1][1]) < 0.01 and 0.03 < tips[1][2] < 0.08
+    large = replace(bare, offsets=3 * bare.offsets)
+    extras = zip(body(bare).extras, body(large).extras, strict=True)
+    assert all(a[:2] == b[:2] and abs(a.along - b.along) < 0.01 for a, b in extras)
+
+
 def test_a_body_scales_with_its_skeleton():
     doubled = Skeleton(
         CANONICAL.names,

@@ -17,6 +17,7 @@ from torch import Tensor
 
 SIDES = ("left", "right")
 LEG_LENGTH = 0.85  # metres from hip to ankle, of the adult whose radii are written below
+HEEL = 0.070  # metres from an adult's ankle, where the toes are a joint, down to the heel
 SHORTEST = 0.008  # metres; shorter bones are drawn by their neighbours' round ends
 # Metres from the root to its farthest tip: a smaller body is dressed, and drawn, as if this large.
 SMALLEST, SHOWN = 0.1, 1.0
@@ -48,7 +49,8 @@ class Bone(NamedTuple):
 
 
 class ExtraPoint(NamedTuple):
-    """The point ``position[a] + along * (position[b] - position[a])``."""
+    """The point ``position[a] + along * (position[b] - position[a])``; a and b may be extra points
+    before it."""
 
     a: int
     b: int
@@ -75,12 +77,10 @@ class Body:
 
     def points(self, positions: Tensor) -> Tensor:
         """Append the extra points: (..., points, 3) -> (..., points + extras, 3), metres."""
-        if not self.extras:
-            return positions
-        a, b, along = (list(column) for column in zip(*self.extras, strict=True))
-        start, end = positions[..., a, :], positions[..., b, :]
-        along = torch.tensor(along, dtype=positions.dtype)[:, None]
-        return torch.cat([positions, start + along * (end - start)], dim=-2)
+        points = list(positions.unbind(-2))
+        for a, b, along in self.extras:
+            points.append(points[a] + along * (points[b] - points[a]))
+        return torch.stack(points, dim=-2)
 
 
 def body(skeleton) -> Body:
@@ -186,16 +186,24 @@ class _Tailor:
             if foot is None or knee is None:
                 return ()
             # Where the toes are a joint of their own, the ankle is marked higher up.
-            heel = self._beyond(knee, foot, 0.070 if f"{side}_toes" in self.roles else 0.030)
+            heel = self._beyond(knee, foot, HEEL if f"{side}_toes" in self.roles else 0.030)
             self._add(foot, heel, (0.036, 0.034))
             toes = self.roles.get(f"{side}_toes", next(iter(self.children[foot]), foot))
             if toes != foot:
                 self._add(heel, toes, (0.036, 0.034))
             tips = [tip for tip in self.children[toes] if self.lengths[tip] > SHORTEST]
             if f"{side}_toes" in self.roles and not tips:
-                self._add(toes, self._beyond(foot, toes, 0.05), LIMBS["toes"])
+                self._add(toes, self._toe_tip(heel, foot, toes), LIMBS["toes"])
             marks += [heel, toes]
         return tuple(marks)
+
+    def _toe_tip(self, heel: int, foot: int, toes: int) -> int:
+        """Ahead of toes that end in the air, as in files from Blender: along the sole. The instep
+        slopes; on a line with it the toes would point into the floor, and lift the body onto them.
+        """
+        instep = self._distance(foot, toes)
+        sole = max(instep**2 - (HEEL * self.size) ** 2, (instep / 2) ** 2, SHORTEST**2) ** 0.5
+        return self._extra(heel, toes, 1 + 0.05 * self.size / sole)
 
     def _head(self) -> int | None:
         head = self.roles.get("head")
