@@ -218,10 +218,17 @@ def _held_out(about: dict) -> str:
             f"| what rounding costs | {half - full:.5f} |"
         )
     full, half = (about["log_likelihood"][kind] for kind in ("full", "half"))
+    doubted = ""
+    if "familiar" in about:
+        doubted = (
+            f"\n| `observe` warns of a start | below {about['familiar']['likelihood']:g} nats a frame,"
+            f" or beyond a distance of {about['familiar']['distance']:g} |"
+        )
     return (
         f"| held-out log-likelihood | {half['value']:.3f} nats a frame [{half['low']:.3f}, "
         f"{half['high']:.3f}] over {half['clips']} validation clips |\n"
         f"| what rounding costs | {full['value'] - half['value']:.4f} nats a frame |"
+        f"{doubted}"
     )
 
 

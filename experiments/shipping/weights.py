@@ -21,6 +21,7 @@ from torch import Tensor, nn
 import motionlab
 from motionlab import MotionLabError
 from motionlab.models import LstmGmm
+from motionlab.models.familiar import bounds
 from motionlab.training import PRESETS, Prepared
 from motionlab.training.checkpoints import load_weights, save_weights, write_whole
 from motionlab.training.evaluation import likelihood
@@ -120,6 +121,8 @@ def mixture(
     before, names = before_starts(data, model.fps)
     nats = {"full": likelihood(model, clips), "half": likelihood(halved, clips)}
     facts = {"log_likelihood": {kind: found._asdict() for kind, found in nats.items()}}
+    if familiar := bounds(halved, clips):
+        facts["familiar"] = familiar._asdict()
     return before, names, sampling, facts
 
 

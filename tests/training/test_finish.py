@@ -51,3 +51,24 @@ def test_finished_weights_are_as_trained_and_begin_in_validation_clips(
         assert (held_out == frame).all(1).any()
     again = finish(tmp_path / "best.safetensors", gaits)
     assert again == sampling
+
+
+def test_bounds_of_strange_starts_are_stored_where_there_are_clips_enough_for_them(
+    train, smoke, gaits, tmp_path, monkeypatch
+):
+    from motionlab import load
+    from motionlab.models import familiar
+
+    train(tmp_path, smoke(updates=10))
+    path = tmp_path / "best.safetensors"
+    finish(path, gaits)
+    assert load(path).familiar is None and "familiar" not in load(path).about
+    monkeypatch.setattr(familiar, "LEAST", 10)
+    finish(path, gaits)
+    model = load(path)
+    assert model.familiar == familiar.bounds(model, gaits.clips("val"))
+    with pytest.warns(UserWarning, match="farther from the mean"):
+        model.observe(3 * gaits.clips("val")[0])
+    monkeypatch.undo()
+    finish(path, gaits)  # what was stored is not kept
+    assert load(path).familiar is None

@@ -42,7 +42,7 @@ class Player(torch.nn.Module):
         self.encoding, self.frames = model.encoding, frames
         self.log_prob = model.log_prob
 
-    def observe(self, features):
+    def observe(self, features, doubt=True):
         return features
 
     def generate(self, n, start, generator):

@@ -150,6 +150,10 @@ def test_card_says_what_the_file_holds(model, shipped, gaits, tmp_path):
     ):  # fmt: skip
         assert said in model.card, said
     assert motionlab.load(shutil.copy(shipped, tmp_path / "b.safetensors")).hash == model.hash
+    assert "familiar" not in about and "warns" not in model.card  # of 26 held-out seconds
+    about = {**about, "familiar": {"likelihood": -12.5, "distance": 4.75}}
+    said = "warns of a start | below -12.5 nats a frame, or beyond a distance of 4.75 |\n| sampling"
+    assert said in cards.card(about, model, 9, 9, 1.0)
 
 
 def test_card_says_what_a_training_began_with(model, shipped, monkeypatch):

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 from .. import encodings
 from ..encodings import Encoding, Normalizer
 from .checks import as_features, check_normalizer, checked_features
+from .familiar import Familiar, warn_of_strange
 from .state import State
 
 
@@ -22,6 +23,7 @@ class Recurrent(nn.Module):
 
     layers = 2
     settings: tuple[str, ...] = ("width",)
+    familiar: Familiar | None = None  # what `motionlab.load` found with the weights
 
     def __init__(self, encoding: Encoding, normalizer: Normalizer, width: int) -> None:
         super().__init__()
@@ -40,12 +42,17 @@ class Recurrent(nn.Module):
         memory = mean.new_zeros(batch, self.layers, self.width)
         return State(mean.expand(batch, -1), memory, memory)
 
-    def observe(self, features: Tensor) -> State:
-        """The state after features (batch, frames, dim), or (frames, dim) for a batch of one."""
+    def observe(self, features: Tensor, *, doubt: bool = True) -> State:
+        """The state after features (batch, frames, dim), or (frames, dim) for a batch of one.
+
+        doubt : warn of what is like hardly anything that the network has learned, if `familiar`
+            says what that is (see `models.familiar`).
+        """
         features = as_features(self, features)
-        return self._seen(
-            checked_features(self, features[None] if features.ndim == 2 else features)
-        )
+        features = checked_features(self, features[None] if features.ndim == 2 else features)
+        if doubt and self.familiar is not None:
+            warn_of_strange(self, features, self.familiar)
+        return self._seen(features)
 
     def config(self) -> dict:
         """What `from_config` needs to build an untrained copy; fit for JSON."""

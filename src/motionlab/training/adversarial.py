@@ -275,7 +275,7 @@ def sample_motions(generator, begun: Windows, preset: GamePreset, number: int) -
     frames, found = round(preset.seconds * generator.fps), []
     for attempt in count():
         chance = torch.Generator().manual_seed(preset.seed * 1_000_003 + 997 * number + attempt)
-        start = generator.observe(begun.draw(preset.samples, chance))
+        start = generator.observe(begun.draw(preset.samples, chance), doubt=False)
         sampling = preset.sampling(generator.sampling)
         made = generator.generate(frames, start, generator=chance, **sampling)
         found += [motion for motion in made if motion.isfinite().all()]

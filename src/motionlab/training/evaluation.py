@@ -81,7 +81,7 @@ def evaluate(
     begun = starting_windows(clips, starts, round(OBSERVED * fps))
     with torch.no_grad():
         made = model.generate(
-            round(seconds * fps), model.observe(begun),
+            round(seconds * fps), model.observe(begun, doubt=False),
             generator=torch.Generator().manual_seed(seed), **sampling,
         )  # fmt: skip
         training = [model.encoding.positions(clip) for clip in data.clips("train")]

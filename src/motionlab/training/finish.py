@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from .. import metrics
 from ..errors import TrainingError
 from ..models import LstmGmm
+from ..models.familiar import bounds
 from .checkpoints import load_weights, save_weights, write_whole
 from .licence import in_words
 from .prepared import Prepared
@@ -29,7 +30,7 @@ def finish(path: str | os.PathLike, data: Prepared) -> dict[str, float]:
     """Add to a training's weights what `motionlab.load` gives with them; what it samples with.
 
     Starts are moments of validation clips. A mixture also gets the temperature at which its motion
-    is as lively as those clips. What the weights are is told in a card beside them.
+    is as lively as those clips, and the bounds beyond which `observe` warns. What the weights are is told in a card beside them.
 
     Raises
     ------
@@ -43,6 +44,9 @@ def finish(path: str | os.PathLike, data: Prepared) -> dict[str, float]:
     if isinstance(model, LstmGmm) and clips:
         sampling["temperature"] = fit_temperature(model, clips, seconds=10.0)
     about |= {"starts": names, "sampling": sampling}
+    about.pop("familiar", None)
+    if isinstance(model, LstmGmm) and (familiar := bounds(model, data.clips("val"))):
+        about["familiar"] = familiar._asdict()
     save_weights(path, model, about, starts=model.observe(before))
     write_card(path)
     return sampling

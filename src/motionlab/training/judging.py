@@ -154,7 +154,7 @@ class Judge:
         begun = torch.stack([clip[:seen] for clip in clips])
         with torch.no_grad():
             made = generator.generate(
-                round(seconds * generator.fps), generator.observe(begun),
+                round(seconds * generator.fps), generator.observe(begun, doubt=False),
                 generator=torch.Generator().manual_seed(seed), **sampling,
             )  # fmt: skip
         sound = made.isfinite().all(-1).all(-1)

@@ -48,6 +48,7 @@ def load(name_or_path: str | os.PathLike) -> nn.Module:
       that was not finished have a single one: that of a network which has seen the mean frame.
     * `start_names`, what the body does in each of them, such as "walk 1.2 m/s".
     * `sampling`, arguments of `generate` that suit these weights best.
+    * `familiar`, below and above which `observe` warns of strange frames; None if it is not known.
     * `hash`, sha256 of the file; `about`, how they were made; `card`, the same as Markdown.
 
     Parameters
@@ -63,6 +64,7 @@ def load(name_or_path: str | os.PathLike) -> nn.Module:
     ModelError : there are no such weights.
     TrainingError : the file is damaged, or holds something else.
     """
+    from ..models.familiar import Familiar
     from ..training.checkpoints import load_weights
 
     path = find(name_or_path)
@@ -74,6 +76,8 @@ def load(name_or_path: str | os.PathLike) -> nn.Module:
     if model.starts is None:
         model.starts = model.observe(model.normalizer.mean[None])
         model.start_names = ("mean frame",)
+    if "familiar" in about:  # not before: a mean frame is no motion
+        model.familiar = Familiar(**about["familiar"])
     card = path.with_suffix(".md")
     model.card = card.read_text(encoding="utf-8") if card.is_file() else ""
     return model
