@@ -80,7 +80,7 @@ def told(model: nn.Module, begun: Tensor, speeds: Tensor, gait: str, sampling: d
         for _, features in rollouts.sampled(
             model, begun, round(SPANS[-1][1] * fps), seed, **sampling
         ):
-            ratios += [_speed(model, motion) for motion in features]
+            ratios += [pace(model, motion) for motion in features]
     ratios = torch.stack(ratios) / speeds.repeat(len(SEEDS))[:, None]  # (samples, frames)
     spans, verdicts = {}, []
     for first, last in SPANS:
@@ -103,7 +103,7 @@ def told(model: nn.Module, begun: Tensor, speeds: Tensor, gait: str, sampling: d
     }
 
 
-def _speed(model: nn.Module, features: Tensor) -> Tensor:
+def pace(model: nn.Module, features: Tensor) -> Tensor:
     """Speed (frames,) in m/s of one motion (frames, dim); NaN from where it is no motion any more."""
     whole = int(features.isfinite().all(-1).cumprod(0).sum())
     speed = torch.full(features.shape[:1], torch.nan)

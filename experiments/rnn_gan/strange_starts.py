@@ -32,7 +32,7 @@ from motionlab.training import Prepared
 from motionlab.weights import find
 
 from ..common import record, rollouts
-from .keeping_pace import GAITS, LEFT, SEEDS, starts
+from .keeping_pace import GAITS, LEFT, SEEDS, pace, starts
 
 LENGTH, JUDGED = 10.0, (8.0, 10.0)  # seconds of a sample, and those in which it is judged
 FOUND = 0.9  # share of faults that must be doubted
@@ -181,17 +181,10 @@ def foretold(
 def leaving(model: nn.Module, begun: Tensor, speeds: Tensor, gait: str, seed: int) -> Tensor:
     """Which samples (starts,) are in another gait in the end, or lost."""
     first, last = (round(time * model.fps) for time in JUDGED)
-    ratios = []
-    for _, features in rollouts.sampled(
-        model, begun, round(LENGTH * model.fps), seed, **model.sampling
-    ):
-        for motion in features:
-            points = rollouts.points_of(model.encoding, motion)
-            whole = bool(points.isfinite().all())
-            pace = metrics.speed(points, model.fps)[first:last].mean() if whole else torch.nan
-            ratios.append(float(pace))
+    made = rollouts.sampled(model, begun, round(LENGTH * model.fps), seed, **model.sampling)
+    paces = [pace(model, motion) for _, features in made for motion in features]
     low, high = LEFT[gait]
-    ratios = torch.tensor(ratios) / speeds
+    ratios = torch.stack(paces)[:, first:last].mean(1) / speeds  # NaN of what is lost
     return ~((ratios >= low) & (ratios <= high))
 
 

@@ -144,7 +144,9 @@ def test_one_recording_of_another_rig_fine_tunes_what_ships(here, capsys):
         motionlab.load(name) for name in ("tuned/best.safetensors", "lstm-gmm-contacts")
     )
     assert len(model.starts.frame) == len(set(model.start_names)) > 1
-    assert all(re.match("(walk|run|stand|backwards|sidestep|turn)", name) for name in model.start_names)
+    assert all(
+        re.match("(walk|run|stand|backwards|sidestep|turn)", name) for name in model.start_names
+    )
     for said in (shipped.hash, "`lstm-gmm-contacts`", "Not for commercial use", "(`mine`), 100.0 %",
                  "CC BY-NC 4.0", model.start_names[0]):  # fmt: skip
         assert said in model.card, said
