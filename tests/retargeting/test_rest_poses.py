@@ -175,3 +175,20 @@ def test_a_target_s_trunk_may_end_at_the_chest():
     axes = roma.random_rotmat(21, generator=torch.Generator().manual_seed(0))
     found = redrawn(walk, axes).retarget(bare)
     assert torch.rad2deg(torch.arccos((trunk(found) * trunk(walk)).sum(-1).clamp(-1, 1))).max() < 5
+
+
+@pytest.mark.parametrize("degrees", [90, 60, 20, -60])
+@pytest.mark.parametrize("name", ["run_3.0", "walk_1.3"])
+def test_elbows_bend_whatever_way_the_arms_of_the_target_rest(name, degrees):
+    """A right angle is arms that hang: there a T-pose's elbow axis lies along the bone."""
+    motion, s = GAITS[name], CANONICAL
+    offsets, ends = s.offsets.clone(), s.end_offsets.clone()
+    for side, sign in (("left", -1), ("right", 1)):
+        turn = roma.rotvec_to_rotmat(torch.tensor([0.0, 0.0, sign * degrees * torch.pi / 180]))
+        below = [s.roles[f"{side}_{part}"] for part in ("lower_arm", "hand")]
+        offsets[below] = offsets[below] @ turn.mT
+        hands = [i for i, parent in enumerate(s.end_parents) if parent == below[1]]
+        ends[hands] = ends[hands] @ turn.mT
+    target = replace(s, offsets=offsets, end_offsets=ends)
+    found, usual = motion.retarget(target), motion.retarget(CANONICAL)
+    assert apart(found, usual) < 0.5

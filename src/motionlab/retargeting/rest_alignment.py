@@ -200,6 +200,13 @@ def bone(skeleton: Skeleton, joint: str, child: str) -> Tensor | None:
     return offset if offset.norm() > SHORT else None
 
 
+def elbow_axis(side: str, upper_arm: Tensor) -> Tensor:
+    """Axis (3,) about which an elbow bends at rest: that of a T-pose, turned along with the upper
+    arm (3,) wherever the rest pose has it. Of an arm that hangs, a T-pose's lies along the bone."""
+    spread = torch.tensor([1.0 if side == "left" else -1.0, 0.0, 0.0])
+    return shortest_turn(spread, upper_arm) @ torch.tensor(ELBOW[side])
+
+
 def _from_stance(stance: Motion, target: Skeleton, roles: list[str]) -> dict[str, Tensor]:
     """From a motion whose mean pose stands: limbs turned the shortest way from there.
 
@@ -264,12 +271,16 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
             axes[joint] = _trunk_axes(seen, ours, theirs, pair, drawn)
     for side in SIDES:
         at = lambda part, side=side: points[:, source.roles[f"{side}_{part}"]]
-        for parts, rest_hinge in (
-            (("upper_arm", "lower_arm", "hand"), ELBOW[side]),
-            (("upper_leg", "lower_leg", "foot", "toes"), KNEE),
+        for parts in (
+            ("upper_arm", "lower_arm", "hand"),
+            ("upper_leg", "lower_leg", "foot", "toes"),
         ):
             if not all(f"{side}_{part}" in roles for part in parts[:3]):
                 continue
+            rest_hinge = torch.tensor(KNEE)
+            if parts[0] == "upper_arm":
+                upper = bone(target, f"{side}_upper_arm", f"{side}_lower_arm")
+                rest_hinge = elbow_axis(side, upper)
             # Where the limb is straight the product is small and says little.
             hinge = torch.linalg.cross(at(parts[1]) - at(parts[0]), at(parts[2]) - at(parts[1]))
             theirs = None
@@ -287,7 +298,7 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
                 nearest = _nearest_axis(axis)
                 if drawn and (nearest @ _unit(theirs)).abs() < math.sin(math.radians(_ACROSS)):
                     axis = nearest
-                axes[joint] = frame(theirs, axis) @ frame(ours, torch.tensor(rest_hinge)).mT
+                axes[joint] = frame(theirs, axis) @ frame(ours, rest_hinge).mT
     return axes
 
 

@@ -36,10 +36,10 @@ from ..skeleton import Skeleton
 from .hips import follow, sink, stretched
 from .joints_between import settled
 from .rest_alignment import (
-    ELBOW,
     SHORT,
     alignment,
     bone,
+    elbow_axis,
     limb_length,
     stance_of,
     stands,
@@ -298,7 +298,8 @@ def _arm(
     elbow = _bend(aside, _turn(world[upper], side_of_elbow / side_of_elbow.norm()))
     offsets = [skeleton.below(*pair) for pair in pairwise((upper, lower, hand))]
     reach = ratio * (at[hand] - at[upper])
-    first, second = two_bone(torch.zeros_like(reach), reach, elbow, *offsets, hinge=ELBOW[side])
+    hinge = tuple(elbow_axis(side, offsets[0]).tolist())
+    first, second = two_bone(torch.zeros_like(reach), reach, elbow, *offsets, hinge=hinge)
     wanted = {upper: first, lower: first @ second}
     return {
         joint: shortest_turn(_turn(world[joint], offset), _turn(turn, offset)) @ world[joint]
