@@ -303,16 +303,16 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
 
 
 def _lies(points: Tensor, world: Tensor, source: Skeleton, joint: str, child: str) -> Tensor | None:
-    """Where one joint lies in the frame of another (3,); None if it moves there and hangs elsewhere.
+    """Where one joint lies in the frame of another (3,): as at rest, which is None if it hangs elsewhere.
 
-    On average in motion if there are joints between, whose rest pose may be any.
+    If there are joints between, whose rest pose may be any, as in motion, where it lies still there:
+    of a spine that bends, the mean is a posture.
     """
     start, end = source.roles[joint], source.roles[child]
-    if source.parents[end] == start:
-        return source.offsets[end]
     seen = (world.mT @ (points[:, end] - points[:, start])[..., None])[..., 0]
-    hangs = source.below(joint, child) is not None
-    return seen.mean(0) if hangs or (seen - seen.mean(0)).norm(dim=-1).max() < SHORT else None
+    still = (seen - seen.mean(0)).norm(dim=-1).max() < SHORT
+    between = source.parents[end] != start
+    return seen.mean(0) if between and still else source.below(joint, child)
 
 
 def _mean(rotations: Tensor) -> Tensor:
