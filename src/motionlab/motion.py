@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -14,6 +15,9 @@ from torch import Tensor
 from .errors import MotionError
 from .kinematics import forward_kinematics
 from .skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from .retargeting.flat_feet import Stance
 
 # A frame time in a file has six digits, so a rate computed from it is off by up to 1e-4.
 _RATE_TOLERANCE = 1e-4
@@ -240,7 +244,7 @@ class Motion:
         )
 
     def retarget(
-        self, skeleton: Skeleton | None = None, *, reference: Motion | None = None
+        self, skeleton: Skeleton | None = None, *, reference: Motion | Stance | None = None
     ) -> Motion:
         """The motion on another skeleton (None: the canonical one), see `motionlab.retargeting`."""
         from .retargeting import retarget

@@ -185,7 +185,7 @@ def test_the_cache_format_is_that_of_this_retargeting():
     )
     points = locomotion.bring(replace(small, source="made")).positions()
     hand, ankle, toes = (points[[20, 60, 100], CANONICAL.index(f"left_{part}")] for part in PARTS)
-    assert locomotion.FORMAT == 8
+    assert locomotion.FORMAT == 9
     expected = torch.tensor(GOLDEN)
     torch.testing.assert_close(torch.stack([hand, ankle, toes]), expected, rtol=0, atol=1e-3)
 
@@ -251,9 +251,9 @@ def test_load_some(own_cache):
 def test_any_clips_of_a_rig_tell_the_same_axes_together():
     for source, names in locomotion.LEARNED.items():
         clips = datasets.load(source, clips=names, download=False)
-        wanted = loader.stance(source).orientations()
+        wanted = loader.stance(source).motion.orientations()
         for some in (clips[::2], clips[1::2]):
-            found = stances(some, CANONICAL).references[0].orientations()
+            found = stances(some, CANONICAL).references[0].motion.orientations()
             assert torch.rad2deg(roma.rotmat_geodesic_distance(found, wanted)).max() < 1
 
 

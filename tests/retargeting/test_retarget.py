@@ -13,6 +13,7 @@ from motionlab import Motion, Skeleton, datasets
 from motionlab.datasets import gaits, loader, locomotion
 from motionlab.errors import RetargetError
 from motionlab.io.bvh import parse_bvh
+from motionlab.retargeting.flat_feet import Stance
 from motionlab.retargeting.rest_alignment import alignment, stands
 from motionlab.retargeting.retarget import _retarget, retarget
 
@@ -81,7 +82,7 @@ def test_onto_its_own_skeleton_is_the_identity(gait):
 @pytest.mark.parametrize("name", NAMES)
 def test_all_steps_together_leave_a_canonical_motion_as_it_is(gait, name):
     motion = gait[name]
-    found = _retarget(motion, CANONICAL, None)
+    found = _retarget(motion, CANONICAL, Stance())
     assert_same(found, motion, 1.0, 0.1)
     assert torch.equal(found.contacts, motion.contacts)
 

@@ -16,7 +16,8 @@ from motionlab import Motion, Skeleton
 from motionlab.datasets import gaits
 from motionlab.errors import RetargetError
 from motionlab.retargeting import rest_alignment
-from motionlab.retargeting.stance import Stances, find_stance, stances
+from motionlab.retargeting.flat_feet import Stance
+from motionlab.retargeting.stance import find_stance, stances
 
 CANONICAL = Skeleton.canonical()
 # A second each of walking, of standing, of walking on.
@@ -89,7 +90,7 @@ def test_clips_of_one_rig_get_the_same_axes():
 def test_each_rig_gets_its_own_and_one_that_stands_needs_none():
     clips = [redrawn(STANDS, 1), WALKS, redrawn(STANDS, 2), redrawn(WALKS, 1), redrawn(WALKS, 2)]
     found = stances(clips, CANONICAL)
-    a, none, b, again, and_again = found.references
+    a, none, b, again, and_again = (its.motion for its in found.references)
     assert none is None and a is again and b is and_again and a is not b
     assert a.skeleton.names[0].startswith("rig1") and b.skeleton.names[0].startswith("rig2")
     assert len(found.said) == 2 and all("2 clips" in said for said in found.said)
@@ -104,7 +105,9 @@ def test_a_rest_pose_that_stands_needs_none_wherever_it_faces():
     )
     turned = quarter @ WALKS.rotations @ quarter.T
     clip = Motion(body, WALKS.root_positions @ quarter.T, turned, WALKS.fps)
-    assert stances([clip, clip], CANONICAL) == Stances([None, None], [])
+    found = stances([clip, clip], CANONICAL)
+    assert [its.motion for its in found.references] == [None, None] and found.said == []
+    assert max(abs(its) for its in found.references[0].flat) < 0.02  # radians: as at rest
 
 
 def test_a_clip_that_lies_spoils_no_axes():
@@ -123,13 +126,13 @@ def test_a_clip_too_small_to_be_retargeted_takes_nothing_from_its_rig():
     clip = redrawn(WALKS, 1)
     small = replace(clip.skeleton, offsets=clip.skeleton.offsets / 100)
     found = stances([replace(clip, skeleton=small), clip], CANONICAL)
-    assert found.references[1] is not None
+    assert found.references[1].motion is not None
 
 
 def test_another_actor_of_the_rig_has_its_axes():
     clips = [redrawn(STANDS, 3), redrawn(WALKS, 3, 1.2)]
     one, other = stances(clips, CANONICAL).references
-    assert one is other
+    assert one is other and one.motion is not None
     assert apart(clips[1].retarget(reference=other), WALKS) < 2
 
 
@@ -137,8 +140,12 @@ def test_where_nobody_stands_all_clips_are_asked_together():
     clips = [redrawn(gaits.make(seconds=3, speed=s, seed=i), 5) for i, s in enumerate((1, 1.5, 2))]
     found = stances(clips, CANONICAL)
     (stance,) = {id(each): each for each in found.references}.values()
-    assert len(stance) == 1 and "nobody stands" in found.said[0] and "--reference" in found.said[0]
-    axes = [rest_alignment.alignment(clip, CANONICAL, stance) for clip in clips]
+    assert (
+        len(stance.motion) == 1
+        and "nobody stands" in found.said[0]
+        and "--reference" in found.said[0]
+    )
+    axes = [rest_alignment.alignment(clip, CANONICAL, stance.motion) for clip in clips]
     assert all(torch.equal(a[role], axes[0][role]) for a in axes for role in a)
 
 
@@ -159,7 +166,7 @@ def test_limbs_that_lie_along_axes_are_rounded_to_quarter_turns():
         clips.append(redrawn(replace(motion, rotations=rotations), turns))
     found = stances(clips, CANONICAL)
     assert "as its bones lie along them" in found.said[0]
-    axes = rest_alignment.alignment(clips[0], CANONICAL, found.references[0])
+    axes = rest_alignment.alignment(clips[0], CANONICAL, found.references[0].motion)
     for role, joint in CANONICAL.roles.items():
         if "arm" in role or "hand" in role or "er_leg" in role:
             torch.testing.assert_close(axes[role], turns[joint].mT, rtol=0, atol=1e-3)
@@ -169,8 +176,9 @@ def test_a_reference_is_taken_where_it_fits():
     clips = [redrawn(STANDS, 1), redrawn(WALKS, 2)]
     given_ = redrawn(t_pose(), 2)
     found = stances(clips, CANONICAL, given_)
-    assert found.references[1].skeleton is given_.skeleton and len(found.references[1]) == 1
-    assert found.references[0].skeleton is clips[0].skeleton
+    assert found.references[1].motion.skeleton is given_.skeleton
+    assert len(found.references[1].motion) == 1
+    assert found.references[0].motion.skeleton is clips[0].skeleton
     assert apart(clips[1].retarget(reference=found.references[1]), WALKS) < 2
 
 
@@ -183,7 +191,7 @@ def test_what_is_said_to_stand_may_stand_with_bent_knees():
     bent = redrawn(replace(t_pose(), rotations=turns), 1)
     assert find_stance([bent]) is None  # nobody would look for it among a folder's clips
     found = stances([redrawn(WALKS, 1)], CANONICAL, bent)
-    assert len(found.references[0]) == 1 and not found.said
+    assert len(found.references[0].motion) == 1 and not found.said
 
 
 def test_a_reference_that_tells_nothing_is_refused():
@@ -197,6 +205,6 @@ def test_a_reference_that_tells_nothing_is_refused():
 def test_rigs_that_cannot_be_retargeted_are_left_to_retarget():
     other = Skeleton(("a", "b"), (-1, 0), torch.zeros(2, 3))
     odd = Motion(other, torch.zeros(3, 3), torch.eye(3).expand(3, 2, 3, 3), 30.0)
-    assert stances([odd, odd], CANONICAL).references == [None, None]
+    assert stances([odd, odd], CANONICAL).references == [Stance(), Stance()]
     for target in (other, "canonical"):
-        assert stances([redrawn(STANDS, 1), redrawn(WALKS, 1)], target).references == [None, None]
+        assert stances([redrawn(STANDS, 1), redrawn(WALKS, 1)], target).references == [Stance()] * 2

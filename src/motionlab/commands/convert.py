@@ -16,6 +16,7 @@ from ..io.bvh_units import is_positive
 from ..io.readings import Readings
 from ..io.root_motion import KINDS
 from ..motion import Motion
+from ..retargeting.flat_feet import Stance
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
 from .clips import WRITERS, Clips, as_options, files_of, write
@@ -75,7 +76,7 @@ class Brought(Written, Rig):
 
     def meet(self, files: list[Path], how: Readings) -> None:
         """Learn how the clips' rigs stand, once for all clips of one rig."""
-        self._stances: dict[Path, Motion | None] = {}
+        self._stances: dict[Path, Stance] = {}
         name = self.onto_name()
         if name is None:
             return

@@ -13,6 +13,7 @@ from ..io import write_bvh
 from ..io.bvh_units import foot_to_head
 from ..io.motion_file import is_bvh, read_rig
 from ..motion import Motion
+from ..retargeting.flat_feet import Stance
 from ..retargeting.onto_rig import onto_rig
 from ..skeleton import Skeleton
 from .clips import as_options, write
@@ -88,7 +89,7 @@ def _of_the_rig(text: str) -> str:
 
 
 def brought_onto(
-    motion: Motion, rig: Motion | None, reference: Motion | None = None
+    motion: Motion, rig: Motion | None, reference: Stance | None = None
 ) -> tuple[Motion, list[str]]:
     """The motion on a rig, or on the canonical body, and what to say of it."""
     if rig is None:

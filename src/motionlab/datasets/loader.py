@@ -20,6 +20,7 @@ from ..io.bvh_reading import Reading
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import ByFile, Readings
 from ..motion import Motion
+from ..retargeting.flat_feet import Stance
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
 from . import cache, files, locomotion
@@ -139,8 +140,8 @@ def _process(name: str, download: bool | None) -> tuple[int, Callable[[Motion], 
 
 
 @functools.cache
-def stance(source: str, download: bool | None = None) -> Motion | None:
-    """The motion by which `locomotion` knows how a source's rig stands; None if its rest pose does."""
+def stance(source: str, download: bool | None = None) -> Motion | Stance | None:
+    """That by which `locomotion` knows how a source's rig stands; None if its rest pose does."""
     if source in locomotion.LEARNED:
         together = load(source, clips=locomotion.LEARNED[source], download=download)
         return stances(together, Skeleton.canonical()).references[0]

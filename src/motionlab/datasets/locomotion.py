@@ -18,10 +18,11 @@ from __future__ import annotations
 
 from ..motion import Motion
 from ..retargeting import retarget
+from ..retargeting.flat_feet import Stance
 from .registry import LOCOMOTION_FPS
 
 # Raise this when retargeting changes, so that cached results are made anew.
-FORMAT = 8
+FORMAT = 9
 # Where a source's rest pose is no standing body: a clip that begins with standing upright, and how
 # many frames of it.
 STANCES = {"accad": ("Male1_B1_StandToWalk", 30), "virvig-jl": ("JL_mm_tpose", 1)}
@@ -35,6 +36,6 @@ LEARNED = {
 }  # fmt: skip
 
 
-def bring(motion: Motion, stance: Motion | None = None) -> Motion:
+def bring(motion: Motion, stance: Motion | Stance | None = None) -> Motion:
     """One clip of a source to the canonical skeleton, by the stance of its source if it needs one."""
     return retarget(motion.resample(LOCOMOTION_FPS), reference=stance)

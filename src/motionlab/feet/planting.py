@@ -24,6 +24,7 @@ from torch import Tensor
 
 from ..ik.turns import shortest_turn, turn_about
 from ..kinematics import yaw_matrix
+from .flat import STEP, STILL, steps
 
 # A part of a foot rests if it is slow: metres a second, and share of the body's speed, as markers
 # on running feet slip;
@@ -31,7 +32,7 @@ _SPEED, _SLIP = 0.20, 0.05
 # and low: metres above where it was lowest within so many seconds (heel, toes), which is more where
 # it does not move at all;
 _HEIGHT, _NEAR = (0.015, 0.020), 0.5
-_STILL, _STILL_HEIGHT = 0.15, 0.06
+_STILL_HEIGHT = 0.06
 # and if the foot is not tipped the other way: radians.
 _TIPPED = 0.35
 _SHORTEST = 2  # frames
@@ -40,18 +41,13 @@ _SHORTEST = 2  # frames
 _STRAY = 0.025  # metres
 _DIP = 0.015  # metres by which an ankle may lie lower than in a flat foot
 _TIP = 0.003  # metres that the tip of the toes stays above the floor
-_STEP = 0.06  # metres by which what one foot stands on is higher than what the other does
-# A flat foot points so many radians below the horizontal, and its toes so many down or up from
-# where they are in a stance. It is flat in the frames with the toes highest, but for some of the
-# frames, and in both feet nearly alike.
-_FLAT, _NEAR_STANCE, _FLATTEST, _STEEPER = (-0.25, 0.95), (-0.45, 0.25), 0.75, 0.25
-_RESTED = 0.3  # seconds of standing that tell how a flat foot looks
 _ROLL, _ROUNDS = 0.5, 6  # radians that a heel may rise or sink about toes that are down
 _CLEAR = 0.35  # radians that toes may go up lest they scrape the floor in a swing
 _MENDED = 0.001  # metres that a leg is still too long or short when its heel has mended it
 _GAP = 0.02  # metres by which a leg may be too long or short for toes to be down
 _EASE = 0.15  # seconds in which a foot that left the floor, or comes to it, is let go of
 _TURN = 0.5  # seconds in which a heel that rose or sank about toes on the floor turns back
+_FORGOTTEN = 1.0  # seconds from a stance in which what it turned a flat foot by is forgotten
 _UP = torch.tensor([0.0, 1.0, 0.0])
 
 
@@ -115,8 +111,8 @@ def find_contacts(ankles: Tensor, toes: Tensor, feet: Tensor, speed: Tensor, fps
     near = 2 * round(_NEAR * fps) + 1
     lowest = torch.from_numpy(minimum_filter1d(height.numpy(), near, axis=1))
     above, step = height - lowest, steps(points) * fps
-    low = (above < torch.tensor(_HEIGHT)) | ((above < _STILL_HEIGHT) & (step < _STILL))
-    low &= height < lowest.flip(0) + _STEP
+    low = (above < torch.tensor(_HEIGHT)) | ((above < _STILL_HEIGHT) & (step < STILL))
+    low &= height < lowest.flip(0) + STEP
     found = low & (step < (_SPEED + _SLIP * speed)[:, None])
     toes_up = torch.atan2(feet[..., 1, 2], feet[..., 1, 1])
     found[..., 0] &= toes_up > -_TIPPED
@@ -130,58 +126,6 @@ def find_contacts(ankles: Tensor, toes: Tensor, feet: Tensor, speed: Tensor, fps
     return torch.from_numpy(found)
 
 
-def steps(points: Tensor) -> Tensor:
-    """Distance (..., frames, points) to the frame before or after, whichever is nearer.
-
-    What came to rest in a frame is at rest in it already. points : (..., frames, points, 3).
-    """
-    if points.shape[-3] == 1:
-        return points.new_zeros(points.shape[:-1])
-    step = points.diff(dim=-3).norm(dim=-1)
-    before = torch.cat([step[..., :1, :], step], dim=-2)
-    return torch.minimum(before, torch.cat([step, step[..., -1:, :]], dim=-2))
-
-
-def levelled(
-    feet: Tensor, ankles: Tensor, toes: Tensor, fps: float, stance: Tensor | None = None
-) -> Tensor:
-    """Orientations (2, frames, 3, 3) of both feet, each pitched to be level where it stands flat.
-
-    A foot that stands still tells how a flat one looks, unless it stands on its toes: it must point
-    as a flat one can, and nearly as in the stance where that is known; one that is steeper than the
-    other at its flattest, or that never stands so, is levelled as the other. If neither does, both
-    are level where they are so in the stance, or stay as they are.
-
-    Parameters
-    ----------
-    feet : (2, frames, 3, 3), world orientations; identity is a flat foot that faces +z.
-    ankles, toes : (2, frames, 3) metres.
-    fps : frames per second.
-    stance : (2,) radians by which toes point up in these orientations while the body stands.
-    """
-    way = toes - ankles
-    down = torch.asin((-way[..., 1] / way.norm(dim=-1).clamp(min=1e-6)).clamp(-1, 1))
-    pitches = torch.atan2(feet[..., 1, 2], feet[..., 1, 1])
-    flat = (steps(torch.stack([ankles, toes], 2)) * fps < _STILL).all(2)
-    flat &= toes[..., 1] < toes[..., 1].flip(0) + _STEP
-    flat &= (down > _FLAT[0]) & (down < _FLAT[1])
-    if stance is None:
-        stance = torch.zeros(2)
-    else:
-        off = pitches - stance[:, None]
-        flat &= (off > _NEAR_STANCE[0]) & (off < _NEAR_STANCE[1])
-    seen = [
-        pitch[rests].quantile(_FLATTEST) - usual if rests.sum() >= _RESTED * fps else None
-        for pitch, rests, usual in zip(pitches, flat, stance, strict=True)
-    ]
-    turn = torch.zeros(2, 1, 3)
-    for i, (own, other) in enumerate((seen, seen[::-1])):
-        if other is not None and (own is None or own < other - _STEEPER):
-            own = other
-        turn[i, 0, 0] = stance[i] if own is None else stance[i] + own
-    return feet @ roma.rotvec_to_rotmat(turn)
-
-
 def runs(values: np.ndarray) -> list[tuple[int, int]]:
     """Start and end of each run of equal values (n,) or equal rows (n, k)."""
     rows = values.reshape(len(values), -1)
@@ -190,7 +134,9 @@ def runs(values: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[:-1], edges[1:], strict=True))
 
 
-def plant(ankle: Tensor, foot: Tensor, toes: Tensor, contacts: Tensor, sole: Sole) -> Foot:
+def plant(
+    ankle: Tensor, foot: Tensor, toes: Tensor, contacts: Tensor, sole: Sole, fps: float
+) -> Foot:
     """Hold a foot still while it is in contact.
 
     Parameters
@@ -198,13 +144,15 @@ def plant(ankle: Tensor, foot: Tensor, toes: Tensor, contacts: Tensor, sole: Sol
     ankle : (frames, 3) metres, its way as scaled from the source.
     foot, toes : (frames, 3, 3), world orientations; identity is a flat foot that faces +z.
     contacts : bool (frames, 2): heel, toe.
+    fps : frames per second.
 
     Returns
     -------
     Foot : where it is in contact, and not below the floor; `let_go` sees to the rest of its way.
     """
     level = _level(foot, contacts)
-    foot = _carried(foot, level, contacts.all(1))
+    flat = contacts.all(1)
+    foot = _carried(foot, level, flat, 1 - _loose(flat, fps, _FORGOTTEN))
     toes = _carried(toes, yaw_matrix(_yaw(foot)), contacts[:, 1])
     reach = (foot @ sole.toes[:, None])[..., 0]  # from ankle to toe joint
     shift, contacts = torch.zeros_like(ankle), contacts.clone()
@@ -375,12 +323,20 @@ def _yaw(orientations: Tensor) -> Tensor:
     return torch.atan2(-orientations[:, 2, 0], orientations[:, 0, 0])
 
 
-def _carried(orientations: Tensor, wanted: Tensor, where: Tensor) -> Tensor:
-    """Orientations that are as wanted `where` (frames,) says, and change smoothly in between."""
+def _carried(
+    orientations: Tensor, wanted: Tensor, where: Tensor, share: Tensor | None = None
+) -> Tensor:
+    """Orientations that are as wanted `where` (frames,) says, and change smoothly in between.
+
+    share : (frames,) of what is changed elsewhere; all of it if None.
+    """
     if not where.any():
         return orientations
     change = roma.rotmat_to_rotvec(orientations.mT @ wanted)  # in the foot's frame, as feet turn
-    return orientations @ roma.rotvec_to_rotmat(bridged(change, where))
+    change = bridged(change, where)
+    if share is not None:
+        change = change * share[:, None]
+    return orientations @ roma.rotvec_to_rotmat(change)
 
 
 def bridged(values: Tensor, known: Tensor) -> Tensor:

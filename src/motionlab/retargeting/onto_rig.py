@@ -22,6 +22,7 @@ from ..errors import RetargetError
 from ..motion import Motion
 from ..roles import SIDES
 from ..skeleton import Skeleton
+from .flat_feet import Stance
 from .joints_between import in_axes, reaxed
 from .rest_alignment import alignment, bone, facing, frame, stands
 from .retarget import NEEDED, retarget
@@ -33,7 +34,7 @@ _UPRIGHT = 0.5  # share of frames in which the trunk must be upright
 _LEANING = 0.7  # cosine of how far an upright trunk may lean
 
 
-def onto_rig(motion: Motion, rig: Motion, *, reference: Motion | None = None) -> Motion:
+def onto_rig(motion: Motion, rig: Motion, *, reference: Motion | Stance | None = None) -> Motion:
     """The motion on the skeleton of `rig`, feet on the floor y = 0 and still while in contact.
 
     Parameters

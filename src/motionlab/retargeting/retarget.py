@@ -28,11 +28,13 @@ from scipy.ndimage import gaussian_filter1d
 from torch import Tensor
 
 from ..errors import RetargetError
-from ..feet.planting import Foot, Sole, find_contacts, let_go, levelled, plant
+from ..feet.flat import levelled
+from ..feet.planting import Foot, Sole, find_contacts, let_go, plant
 from ..ik import two_bone
 from ..ik.turns import shortest_turn
 from ..roles import SIDES
 from ..skeleton import Skeleton
+from .flat_feet import HANGING, Stance, ends_of, scaled, toes_up, with_flat_feet
 from .hips import follow, sink, stretched
 from .joints_between import settled
 from .rest_alignment import (
@@ -62,12 +64,11 @@ _BONES = tuple(
 _TOE_HEIGHT = 0.0251 / 0.8007  # of a flat foot's toe joint above the floor, in lengths of the leg
 _STRAIGHT = 0.005  # metres off the line between its ends, of the middle of a limb
 _SETTLE_TIME = 0.35  # seconds
-_HANGING = 0.7  # radians by which feet are pitched that hang in the air, or point at the viewer
 
 
 @torch.no_grad()
 def retarget(
-    motion: Motion, skeleton: Skeleton | None = None, *, reference: Motion | None = None
+    motion: Motion, skeleton: Skeleton | None = None, *, reference: Motion | Stance | None = None
 ) -> Motion:
     """The motion on another skeleton, feet on the floor y = 0 and still while in contact.
 
@@ -78,7 +79,8 @@ def retarget(
         faces +z. A motion that is on it already, whatever its joints are called, is not changed.
     reference : a motion of the source's skeleton in which a person stands upright, arms hanging or
         spread. It tells how joint axes lie where the rest pose is no standing body; without it
-        they are guessed from the motion itself, for which it should be upright most of the time.
+        they are guessed from the motion itself, for which it should be upright most of the time. Or
+        what `stance.stances` found in all clips of the rig, which knows its flat feet, too.
 
     Returns
     -------
@@ -102,9 +104,11 @@ def retarget(
         return motion
     if _same_body(motion.skeleton, skeleton):
         return replace(motion, skeleton=skeleton)
-    _check(motion, skeleton, reference)
-    reference = None if reference is None else settled(reference)
-    return _retarget(settled(motion), skeleton, reference)
+    stance = reference if isinstance(reference, Stance) else Stance(reference)
+    _check(motion, skeleton, stance.motion)
+    if reference is not None and stance is not reference:
+        stance = with_flat_feet(reference, [reference, motion])
+    return _retarget(settled(motion), skeleton, stance.settled())
 
 
 def _moves(value: object) -> bool:
@@ -160,16 +164,11 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
         )
 
 
-def _retarget(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> Motion:
-    points, orientations = motion.positions(), motion.orientations()
-    source = motion.skeleton.roles
-    axes = alignment(motion, skeleton, reference)
-    turned = {role: orientations[:, source[role]] @ turn for role, turn in axes.items()}
+def _retarget(motion: Motion, skeleton: Skeleton, stance: Stance) -> Motion:
+    axes = alignment(motion, skeleton, stance.motion)
+    at, turned, scale = scaled(motion, skeleton, axes)
     world = _fill(turned, skeleton)
-    scale = limb_length(skeleton, "leg") / limb_length(motion.skeleton, "leg")
-    at = {role: points[:, joint] * scale for role, joint in source.items()}
-    soles = [_sole(side, skeleton) for side in SIDES]
-    feet = _feet(at, world, soles, motion, _toes_up(stance_of(motion, reference), axes))
+    feet = _feet(at, world, motion, skeleton, *_level(stance, motion, axes))
 
     legs = torch.stack([skeleton.below("hips", f"{side}_upper_leg") for side in SIDES])
     middle = (at["left_upper_leg"] + at["right_upper_leg"]) / 2
@@ -220,44 +219,39 @@ def _sole(side: str, skeleton: Skeleton) -> Sole:
     return Sole(sole, torch.zeros(3) if tip is None else tip, heights)
 
 
-def _toes_up(stance: Motion | None, axes: dict[str, Tensor]) -> Tensor | None:
-    """Radians (2,) by which toes point up while the body stands, if that is known and can be."""
-    if stance is None:
-        return None
-    world = stance.orientations()
-    feet = [
-        world[:, stance.skeleton.roles[f"{side}_foot"]] @ axes[f"{side}_foot"] for side in SIDES
-    ]
-    feet = torch.stack(feet)
-    pitches = torch.atan2(feet[..., 1, 2], feet[..., 1, 1]).median(1).values
-    return pitches if pitches.abs().max() < _HANGING else None
+def _level(
+    stance: Stance, motion: Motion, axes: dict[str, Tensor]
+) -> tuple[Tensor | None, Tensor | None]:
+    """Radians (2,) by which toes point up in the stance and in flat feet, None if that isn't known."""
+    stands = stance_of(motion, stance.motion)
+    if stands is None:
+        return None, None
+    pitches = toes_up(stands, axes)
+    flat = None if stance.flat is None else pitches + torch.tensor(stance.flat)
+    return (pitches if pitches.abs().max() < HANGING else None), flat
 
 
 def _feet(
     at: dict[str, Tensor],
     world: dict[str, Tensor],
-    soles: list[Sole],
     motion: Motion,
+    skeleton: Skeleton,
     stance: Tensor | None,
+    flat: Tensor | None,
 ) -> list[Foot]:
-    """Both feet on the ground, from where they are scaled. stance : see `levelled`."""
+    """Both feet on the ground, from where they are scaled. stance, flat : see `levelled`."""
     fps = motion.fps
-    ankles = torch.stack([at[f"{side}_foot"] for side in SIDES])
-    drawn = torch.stack([world[f"{side}_foot"] for side in SIDES])
-    toes = torch.stack([
-        at.get(f"{side}_toes", ankle + _turn(foot, sole.toes))
-        for side, ankle, foot, sole in zip(SIDES, ankles, drawn, soles, strict=True)
-    ])  # fmt: skip
-    level = levelled(drawn, ankles, toes, fps, stance)
+    drawn, ankles, toes = ends_of(at, world, skeleton)
+    level = levelled(drawn, ankles, toes, fps, stance, flat)
     if motion.contacts is None:
         contacts = find_contacts(ankles, toes, level, _speed(at, fps), fps)
     else:
         contacts = torch.stack([motion.contacts[:, :2], motion.contacts[:, 2:]])
     feet = []
-    for i, foot in enumerate(level):
+    for i, (side, foot) in enumerate(zip(SIDES, level, strict=True)):
         # where the toes point, if they are a joint
-        pointing = world.get(f"{SIDES[i]}_toes", drawn[i])
-        feet.append(plant(ankles[i], foot, pointing, contacts[i], soles[i]))
+        pointing = world.get(f"{side}_toes", drawn[i])
+        feet.append(plant(ankles[i], foot, pointing, contacts[i], _sole(side, skeleton), fps))
     return feet
 
 

@@ -7,6 +7,8 @@ clip to clip; here they are learned once for all clips of a rig, as a `reference
   quarter turns away, and all motion together tells which;
 * else from moments in which a person stands (`find_stance`);
 * else, which is less sure, from all motion together.
+
+How its flat feet look is learned so, too, from all clips of one body (`flat_feet`).
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from ..errors import RetargetError
 from ..motion import Motion, concatenate
 from ..roles import SIDES
 from ..skeleton import Skeleton
+from .flat_feet import Stance, with_flat_feet
 from .rest_alignment import SHORT, alignment, facing, rising, upright
 from .retarget import NEEDED
 
@@ -47,26 +50,27 @@ _SAMPLE = 3000  # frames of all clips together, to learn axes from
 _ALONG = 3.0  # degrees between a bone and the axis along which it is drawn
 _NEAR = 30.0  # degrees from a quarter turn, of what is learned of one
 _LIMBS = (("upper_arm", "lower_arm", "hand"), ("upper_leg", "lower_leg", "foot"))
-_PARALLEL = 10.0  # degrees between the bones of two bodies of one rig
+_PARALLEL, _ALIKE = 10.0, 1.0  # degrees between the bones of two bodies of one rig; of one body
 
 
 @dataclass(frozen=True)
 class Stances:
-    """references : of each clip, None where it needs none. said : how they were found, in words."""
+    """references : for each clip, for `retarget`. said : how joint axes were found, in words."""
 
-    references: list[Motion | None]
+    references: list[Stance]
     said: list[str]
 
 
 def stances(
     motions: Sequence[Motion], skeleton: Skeleton, reference: Motion | None = None
 ) -> Stances:
-    """The reference by which each clip is to be retargeted, the same for all clips of one rig.
+    """The reference by which each clip is to be retargeted: one way to stand for all clips of a rig,
+    and one pair of flat feet for all clips of a body.
 
     Parameters
     ----------
     motions : of any rigs. Those with the same joints and bones along the same axes are one rig. One
-        whose rest pose stands needs no reference.
+        whose rest pose stands needs no other motion that does.
     skeleton : what they will be retargeted to.
     reference : a motion of one of the rigs, in which a person stands; for its clips that is it.
 
@@ -75,9 +79,9 @@ def stances(
     RetargetError : nobody stands in `reference`, or it is of another rig than all clips.
     """
     given = None if reference is None else _checked(reference, motions)
-    found: list[Motion | None] = [None] * len(motions)
+    found = [Stance()] * len(motions)
     said = []
-    for group in _rigs(motions):
+    for group in _alike(motions, range(len(motions)), _PARALLEL):
         whole = [motions[i] for i in group if _is_whole(motions[i].skeleton)]
         if not whole or not _is_whole(skeleton):
             continue  # `retarget` says why it can't
@@ -85,7 +89,7 @@ def stances(
         if given is not None and _same_rig(its, given.skeleton):
             stance = given
         elif upright(its):
-            continue
+            stance = None
         else:
             stance, how = _of_rig(_teachers(whole), skeleton)
             what = "1 clip" if len(group) == 1 else f"{len(group)} clips of one rig"
@@ -93,8 +97,11 @@ def stances(
                 f"the rest pose of {what} is no standing body; how its joint axes lie is learned "
                 f"once, {how}"
             )
-        for i in group:
-            found[i] = stance
+        for body in _alike(motions, group, _ALIKE):
+            teachers = [motions[i] for i in body if _is_whole(motions[i].skeleton)]
+            its = with_flat_feet(stance, _teachers(teachers)) if teachers else Stance(stance)
+            for i in body:
+                found[i] = its
     return Stances(found, said)
 
 
@@ -273,12 +280,12 @@ def _checked(reference: Motion, motions: Sequence[Motion]) -> Motion:
     return reference if stance is None else stance
 
 
-def _rigs(motions: Sequence[Motion]) -> list[list[int]]:
-    """Indices of the motions, those of one rig together."""
+def _alike(motions: Sequence[Motion], indices: Sequence[int], parallel: float) -> list[list[int]]:
+    """Some of the motions, by their indices, those of one rig together, or of one body."""
     groups: list[list[int]] = []
-    for i, motion in enumerate(motions):
+    for i in indices:
         for group in groups:
-            if _same_rig(motions[group[0]].skeleton, motion.skeleton):
+            if _same_rig(motions[group[0]].skeleton, motions[i].skeleton, parallel):
                 group.append(i)
                 break
         else:
@@ -286,15 +293,18 @@ def _rigs(motions: Sequence[Motion]) -> list[list[int]]:
     return groups
 
 
-def _same_rig(one: Skeleton, other: Skeleton) -> bool:
-    """The same joints, drawn along the same axes; bones may be longer, as another actor's are."""
+def _same_rig(one: Skeleton, other: Skeleton, parallel: float = _PARALLEL) -> bool:
+    """The same joints, drawn along the same axes; bones may be longer, as another actor's are.
+
+    parallel : degrees between their bones.
+    """
     if one is other:
         return True
     if (one.names, one.parents) != (other.names, other.parents):
         return False
     a, b = one.offsets[1:], other.offsets[1:]
     long = (a.norm(dim=-1) > 0.01) & (b.norm(dim=-1) > 0.01)
-    return bool((_angle(a, b)[long] < _PARALLEL).all())
+    return bool((_angle(a, b)[long] < parallel).all())
 
 
 def _limb_bones(skeleton: Skeleton) -> list[Tensor | None]:

@@ -28,6 +28,8 @@ from ..encodings import JointAngles, Normalizer, RootRelative
 from ..errors import DataError, TrainingError
 from ..io.bvh_up import doubt_up
 from ..motion import Motion
+from ..retargeting.flat_feet import Stance
+from ..retargeting.stance import stances
 from ..skeleton import Skeleton
 from .checkpoints import write_whole
 
@@ -220,16 +222,30 @@ def _load(
     known = str(source) in datasets.names()
     if known:
         _refuse(source, reading)
+    stood = _stood(source, permissive) if known else {}
     own = [] if known else _own(source, permissive, reading)
     for split in SPLITS:
         if known:
             loaded = datasets.load(source, split, permissive=permissive)
-            motions = [bring(motion, stance(motion.source)) for motion in loaded]
+            motions = [bring(motion, stood[motion.name]) for motion in loaded]
         else:
             motions = [motion for its, motion in own if its == split]
         if split == "train":
             motions += [replace(m.mirror(), name=f"{m.name}_mirrored") for m in motions]
         yield split, motions
+
+
+def _stood(source: str, permissive: bool) -> dict[str, Motion | Stance | None]:
+    """How the rig of each clip of a data set stands, by its name, and its flat feet.
+
+    These are learned from all splits together, where the rest pose stands.
+    """
+    motions = datasets.load(source, permissive=permissive)
+    found = {motion.name: stance(motion.source) for motion in motions}
+    body = Skeleton.canonical()
+    left = [m for m in motions if found[m.name] is None and not m.skeleton.matches(body)]
+    learned = stances(left, body).references
+    return found | {motion.name: its for motion, its in zip(left, learned, strict=True)}
 
 
 def _refuse(source: str | os.PathLike, reading: dict) -> None:
