@@ -6,16 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import roma
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from other_rigs import random_axes, redrawn
 
 from motionlab import Skeleton, contacts, load
 from motionlab.datasets import gaits
 from motionlab.errors import ModelError
 from motionlab.feet.contacts import foot_points
-from motionlab.feet.lock import _clean, lock
+from motionlab.feet.legs import PARTS, leg_joints
+from motionlab.feet.lock import STRAIGHT, _clean, lock
 from motionlab.metrics import foot_skate
+from motionlab.roles import SIDES
 from motionlab.solvers import lock_feet
 
 TOES = [1, 3]
@@ -111,6 +115,102 @@ def test_knees_bend_forward():
         knee = locked.rotations[:, locked.skeleton.index(f"{side}_lower_leg")]
         pitch = torch.atan2(knee[:, 2, 1], knee[:, 1, 1])  # about x: above 0 is bent backwards up
         assert pitch.min() > -0.02
+
+
+def legs_of(motion):
+    """Knees and ankles (frames, 2, 3) as seen from their hips, left first."""
+    joints, points = leg_joints(motion.skeleton), motion.positions()
+    hips, knees, ankles = (points[:, joints[part]] for part in PARTS[:3])
+    return knees - hips, ankles - hips
+
+
+def lifted(motion, thigh, splay, knee, seconds=(1.0, 2.0)):
+    """The motion, its left leg in another pose for a while, turned by radians from hanging down.
+
+    thigh : ahead; splay : aside; knee : folded, below 0 bent backwards.
+    """
+    at = torch.arange(len(motion)) / motion.fps
+    begin, end = seconds
+    share = ((at - begin) / 0.3).minimum((end - at) / 0.3).clamp(0, 1)
+    turns = {
+        "left_upper_leg": torch.tensor([-thigh, 0.0, splay]),
+        "left_lower_leg": torch.tensor([knee, 0.0, 0.0]),
+    }
+    rotations = motion.rotations.clone()
+    for name, turn in turns.items():
+        joint = motion.skeleton.role(name)
+        was = roma.rotmat_to_unitquat(rotations[:, joint])
+        pose = roma.rotmat_to_unitquat(roma.rotvec_to_rotmat(turn))
+        mixed = [roma.unitquat_slerp(q, pose, s, True) for q, s in zip(was, share, strict=True)]
+        rotations[:, joint] = roma.unitquat_to_rotmat(torch.stack(mixed))
+    return replace(motion, rotations=rotations)
+
+
+def kick(**more):
+    """`sliding`, the left leg off the floor and in a pose for a while; and its contacts."""
+    motion, down = sliding()
+    down = down.clone()
+    down[int(0.7 * motion.fps) : int(2.3 * motion.fps), 0] = False
+    return lifted(motion, **more), down
+
+
+@pytest.mark.parametrize("thigh", [1.4, 2.4])
+@pytest.mark.parametrize("knee", [1.5, 2.65])
+@pytest.mark.parametrize("leans", [-0.03, 0.03])
+def test_a_knee_raised_in_front_stays_there(thigh, knee, leans):
+    """Where thighs lean at rest, in metres, and legs fold up, a front points backwards from a leg."""
+    motion, down = kick(thigh=thigh, splay=0.0, knee=knee)
+    offsets = motion.skeleton.offsets.clone()
+    for part, forward in (("lower_leg", leans), ("foot", -leans)):
+        offsets[[motion.skeleton.role(f"{side}_{part}") for side in SIDES], 2] += forward
+    motion = replace(motion, skeleton=replace(motion.skeleton, offsets=offsets))
+    locked = lock_feet(motion, down)
+    (was, ankle), (found, now) = legs_of(motion), legs_of(locked)
+    went = (found - was).norm(dim=-1)
+    assert went.max() < 0.1
+    assert (
+        went <= 2 * least_moves(was, ankle, now) + 1.1 * (now - ankle).norm(dim=-1) + 5e-4
+    ).all()
+
+
+def least_moves(knee, ankle, now):
+    """How far knees (..., 3) must go at least for ankles that go from `ankle` to `now`.
+
+    They may lie on a circle about the line from hip to ankle; all are seen from the hip.
+    """
+    thigh, shank = knee.norm(dim=-1), (ankle - knee).norm(dim=-1)
+    far = now.norm(dim=-1)
+    along = ((thigh**2 + far**2 - shank**2) / (2 * far)).clamp(-thigh, thigh)
+    beside = (thigh**2 - along**2).clamp(min=0).sqrt()
+    line = now / far[..., None]
+    level = (knee * line).sum(-1)
+    return torch.hypot(level - along, (knee - level[..., None] * line).norm(dim=-1) - beside)
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    thigh=st.floats(-0.6, 2.6), splay=st.floats(-0.5, 1.2), knee=st.floats(-1.0, 2.7),
+    aired=st.booleans(), slide=st.floats(-0.3, 0.3), seed=st.integers(0, 10_000),
+)  # fmt: skip
+def test_no_knee_goes_much_farther_than_its_foot(thigh, splay, knee, aired, slide, seed):
+    """Unmoved feet leave their legs; bent knees stay on the side to which they bent."""
+    down = kick(thigh=0.0, splay=0.0, knee=0.0)[1] if aired else sliding()[1]
+    motion = lifted(sliding(slide=slide)[0], thigh, splay, knee)
+    motion = redrawn(motion, random_axes(motion.skeleton, seed))
+    locked = lock_feet(motion, down, floor=None)
+    (was, ankle), (found, now) = legs_of(motion), legs_of(locked)
+    went, foot = (found - was).norm(dim=-1), (now - ankle).norm(dim=-1)
+    assert (went[foot < 1e-6] < 5e-4).all()
+    line = ankle / ankle.norm(dim=-1, keepdim=True)
+    bent = (was - (was * line).sum(-1, keepdim=True) * line).norm(dim=-1) > 2 * STRAIGHT
+    if knee >= 0:  # a knee behind its leg may come out in front
+        assert (went <= 2 * least_moves(was, ankle, now) + 1.1 * foot + 5e-4)[bent].all()
+
+
+def test_a_knee_that_bends_backwards_is_not_turned_round():
+    motion, down = kick(thigh=0.3, splay=0.0, knee=-0.6)
+    (was, _), (found, _) = (legs_of(m) for m in (motion, lock_feet(motion, down)))
+    assert (found - was)[int(1.3 * motion.fps) : int(1.7 * motion.fps), 0].norm(dim=-1).max() < 0.01
 
 
 def test_a_batch_is_its_motions_one_by_one():

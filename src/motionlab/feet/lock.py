@@ -15,8 +15,7 @@ from torch import Tensor
 from torch.nn.functional import max_pool1d, pad
 
 from ..errors import ModelError
-from ..ik.limb import two_bone
-from ..ik.turns import shortest_turn
+from ..ik.turns import shortest_turn, unit
 from ..kinematics import forward_kinematics
 from ..motion import Motion
 from ..skeleton import Skeleton
@@ -30,7 +29,8 @@ RESTS = 0.005  # m/s; a toe that is slower is still, and slides nowhere
 BLEND = 0.25  # seconds from a foot's own way to where it is held
 REACH = 0.97  # share of its length to which a leg may be stretched; near 1 knees snap
 NEAR = 0.04  # metres that a foot may be moved while its leg stays as straight as it was
-STRAIGHT = 0.02  # metres that a knee lies beside its leg; if less, its front says where it points
+STRAIGHT = 0.02  # metres that a knee lies beside its leg; its front has no say from twice as much
+BACKWARDS = 0.07  # metres that it may lie behind its leg and yet come out in front, if it comes out
 SETTLE = 0.15  # seconds over which the body comes down if a leg is too short
 
 
@@ -98,6 +98,7 @@ def lock(
     contacts = _checked(contacts, root_positions, floor, blend, fps)
     joints = leg_joints(skeleton)
     points, world = _forward(skeleton, root_positions, rotations)
+    leg_lengths(skeleton, points)  # refuses legs that lack a bone
     toes = points[..., joints["toes"], :]  # (..., frames, 2, 3)
     held = _clean(contacts & (steps(toes) * fps < FASTEST), fps)
     held = _resting(held, steps(toes) * fps < RESTS)
@@ -256,17 +257,14 @@ def _bent(
 ) -> Tensor:  # fmt: skip
     """Local rotations with legs that reach their ankles; feet keep the way they point."""
     rotations = rotations.clone()
-    fronts, lengths = knee_fronts(skeleton, points, world), leg_lengths(skeleton, points)
+    fronts = knee_fronts(skeleton, points, world)
     for i in range(2):
         upper, lower, foot, toes = (joints[part][i] for part in PARTS)
         knee_was = points[..., lower, :] - points[..., upper, :]
         shin_was = points[..., foot, :] - points[..., lower, :]
-        # of legs that hang straight down at rest, whatever those of this rig do
-        offsets = [length * points.new_tensor([0.0, -1.0, 0.0]) for length in lengths[:, i]]
-        ahead = _knee_direction(knee_was, knee_was + shin_was, fronts[..., i, :])
-        thigh, shank = two_bone(hips[..., i, :], ankle[..., i, :], ahead, *offsets)
-        knee = thigh @ offsets[0]
-        shin = thigh @ shank @ offsets[1]
+        reach = ankle[..., i, :] - hips[..., i, :]
+        knee = _knee(knee_was, shin_was, reach, fronts[..., i, :])
+        shin = reach - knee
         # the smallest turns of the bones as they were, so that no bone is twisted
         turned = {
             upper: shortest_turn(knee_was, knee) @ world[..., upper, :, :],
@@ -305,17 +303,37 @@ def _toes_up(skeleton: Skeleton, toes: int, world: Tensor, heights: Tensor) -> T
     return off_the_floor(was.reshape(-1, 3, 3), heights.reshape(-1), tip.to(was)).reshape(was.shape)
 
 
-def _knee_direction(knee: Tensor, ankle: Tensor, front: Tensor) -> Tensor:
-    """Which way a knee points (..., 3): where it is beside the line from hip to ankle.
+def _knee(knee_was: Tensor, shin_was: Tensor, reach: Tensor, front: Tensor) -> Tensor:
+    """Where a knee is (..., 3), seen from the hip, once its ankle is at `reach` (..., 3).
 
-    Where the leg is nearly straight, that is where its front is. All are seen from the hip.
+    It stays in the plane in which it was bent, as that plane turns with the line from hip to ankle:
+    a leg whose ankle is where it was keeps its knee, be it bent backwards or folded up.
+    `two_bone`, which stays a little short of straight, would move that of a straight leg.
     """
-    line = ankle / ankle.norm(dim=-1, keepdim=True).clamp(min=1e-9)
-    aside = knee - (knee * line).sum(-1, keepdim=True) * line
-    front = front - (front * line).sum(-1, keepdim=True) * line
-    backwards = (aside * front).sum(-1, keepdim=True) < 0
-    aside = torch.where(backwards, torch.zeros_like(aside), aside)
-    return aside + (STRAIGHT - aside.norm(dim=-1, keepdim=True)).clamp(min=0) * front
+    thigh, shank = (bone.norm(dim=-1, keepdim=True) for bone in (knee_was, shin_was))
+    distance = reach.norm(dim=-1, keepdim=True).clamp(min=1e-9)
+    # law of cosines: how far down the line and how far beside it; a leg out of reach is straight
+    along = (thigh**2 + distance**2 - shank**2) / (2 * distance)
+    along = torch.minimum(torch.maximum(along, -thigh), thigh)
+    beside = (thigh**2 - along**2).clamp(min=0).sqrt()
+
+    line_was, line = unit(knee_was + shin_was), unit(reach)
+    aside = knee_was - (knee_was * line_was).sum(-1, keepdim=True) * line_was
+    aside = (shortest_turn(line_was, line) @ aside[..., None])[..., 0]
+    return along * line + beside * _aside(aside, beside, line, front)
+
+
+def _aside(was: Tensor, beside: Tensor, line: Tensor, front: Tensor) -> Tensor:
+    """Which way from the line from hip to ankle a knee lies (..., 3), one long.
+
+    As it `was`; but a leg that was nearly straight or bent a little backwards, whose knee is to come
+    out farther, says little or wrong of where to: so far as it comes out, its front says it.
+    """
+    out = was.norm(dim=-1, keepdim=True)
+    front = unit(front - (front * line).sum(-1, keepdim=True) * line)
+    backwards = (was * front).sum(-1, keepdim=True) < 0
+    share = (2 - out / torch.where(backwards, BACKWARDS, STRAIGHT)).clamp(0, 1)
+    return unit(was + share * 3 * (beside - out).clamp(min=1e-7) * front)
 
 
 def _forward(skeleton: Skeleton, root_positions: Tensor, rotations: Tensor):
