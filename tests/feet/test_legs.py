@@ -109,6 +109,16 @@ def test_the_front_of_legs_that_never_bend_is_where_the_hips_face(axes):
         assert (fronts * thighs[..., 2]).sum(-1).min() > 0.97
 
 
+def test_a_rest_pose_that_is_wrong_of_one_leg_is_asked_about_neither():
+    """ACCAD's Male1 crawls, and the doubt about his right leg stays just below what is too much."""
+    axes = rolled(torch.pi / 2)
+    axes[CANONICAL.role("right_upper_leg")] = roma.rotvec_to_rotmat(0.9 * Y)
+    motion = redrawn(walk(), axes)
+    fronts = knee_fronts(motion.skeleton, motion.positions(), motion.orientations())
+    thighs = walk().orientations()[:, leg_joints(CANONICAL)["upper_leg"]]
+    assert (fronts * thighs[..., 2]).sum(-1).min() > 0.97
+
+
 def test_knees_that_bend_backwards_do_not_say_where_their_front_is():
     """On a rig that rests standing, its rest pose says it, on any other the hips do."""
     back = walk().rotations.clone()

@@ -103,7 +103,8 @@ def knee_fronts(skeleton: Skeleton, points: Tensor, world: Tensor) -> Tensor:
         front = torch.zeros_like(mean)
     else:
         front = front.to(points)
-        sure = mean.norm(dim=-1) - (mean * front).sum(-1) < _DOUBT
+        doubt = mean.norm(dim=-1) - (mean * front).sum(-1)
+        sure = (doubt < _DOUBT).all(-1, keepdim=True)  # a rest pose wrong of one leg is no witness
     if not sure.all():
         bent = _bends(hips, knees, ankles)
         # who bends backwards is a broken figure, and no other rig
