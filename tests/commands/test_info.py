@@ -95,8 +95,8 @@ def test_a_mixed_folder_is_sorted_by_what_fits(tmp_path, capsys):
     write_bvh(whole, tmp_path / "f.bvh", up="z")
     assert main(["info", str(tmp_path)]) == 0
     *_, metres, millimetres = capsys.readouterr().out.splitlines()
-    assert metres == f"{tmp_path}: 2 of 6 files look like units='m': a.bvh, b.bvh"
-    assert millimetres.endswith("2 of 6 files look like units='mm': c.bvh, d.bvh")
+    assert metres == f"{tmp_path}: 2 of 6 files look like --units=m: a.bvh, b.bvh"
+    assert millimetres.endswith("2 of 6 files look like --units=mm: c.bvh, d.bvh")
     assert main(["convert", str(tmp_path), "--out", str(tmp_path / "x")]) == 0
     assert "What looks like --units=m: a.bvh, b.bvh." in capsys.readouterr().out
 

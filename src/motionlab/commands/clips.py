@@ -6,7 +6,6 @@ folder. A file that can't be read, or fails on the way, stops no other one.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,25 +21,20 @@ from ..io.bvh_reading import Reading
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import Readings
 from ..motion import Motion
-from .folder import Files
+from .folder import Taken
+from .options import as_options
 
 WRITERS = {".bvh": write_bvh, ".glb": write_gltf}
 
 
 @dataclass(kw_only=True)
-class Clips(Files):
+class Clips(Taken):
     """A file or a folder of files, and where what becomes of them is written."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
     """What to read; of a folder all files in it and below that can be read."""
     out: Path
     """File to write, or a folder for many; of a file the name's end says what is written."""
-    file_fps: float | None = None
-    """Frames per second of the files, where their own frame time is wrong."""
-    tpose_first: bool = False
-    """Leave out frame 0, a T-pose."""
-    drop_zeros: bool = False
-    """Leave out leading frames in which every rotation is zero."""
     force: bool = False
     """Replace files that are there already."""
     skip_bad: bool = False
@@ -65,10 +59,9 @@ class Clips(Files):
         MotionFileError : nothing can be read, or written where `out` is; at the end, with all
             faults, unless bad ones are to be skipped.
         """
-        how = self.how(fps=self.file_fps, tpose_first=self.tpose_first, drop_zeros=self.drop_zeros)
         pairs = self._pairs(suffix, known)
         files = [file for file, _ in pairs]
-        readings = Readings(self.path, files, how, self.answers())
+        readings = Readings(self.path, files, self.how(), self.answers())
         self.meet(files, readings)
         report = Report(self.path, len(pairs))
         unseen = None if self.path.is_dir() else True  # None: where nobody looks
@@ -163,12 +156,3 @@ def files_of(folder: Path) -> list[Path]:
 def write(motion: Motion, path: Path, root_motion: str | None = None) -> None:
     """Write a motion as what its name ends in says."""
     WRITERS[path.suffix.lower()](motion, path, root_motion=root_motion)
-
-
-def as_options(text: str) -> str:
-    """What is said of arguments, as ``up='z'``, in the words of the command line: ``--up=z``."""
-    text = re.sub(r"\b(units|up|root|rigid|animation)='([^']*)'", r"--\1=\2", text)
-    text = re.sub(r"\bby_file=", "--by-file", text)
-    text = re.sub(r"(?<![-\w])animation=", "--animation=", text)
-    text = re.sub(r"(?<![-\w])fps=", "--file-fps=", text)
-    return re.sub(r"(?<![-\w])skeleton=", "--skeleton=", text)

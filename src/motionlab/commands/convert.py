@@ -19,7 +19,8 @@ from ..motion import Motion
 from ..retargeting.flat_feet import Stance
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
-from .clips import WRITERS, Clips, as_options, files_of, write
+from .clips import WRITERS, Clips, files_of, write
+from .options import as_options
 from .rig import CANONICAL, Rig, brought_onto
 
 MOST_FPS = 1000  # no one plays more; a slip of the finger would fill the memory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +18,8 @@ from ..io.bvh_units import foot_to_head
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import ByFile, Readings
 from ..roles import ALL
-from .folder import Files
+from .folder import Taken
+from .options import as_options
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -26,14 +27,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Info(Files):
+class Info(Taken):
     """What is in a motion file and which joint is understood as what; a line a file for a folder."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
     """A .bvh, .amc, .glb or .gltf file, or a folder of them."""
 
     def run(self) -> None:
-        print(_described(self.path, self.how(), self.answers()))
+        print(_described(self.path, self.how(), self.answers(), as_options))
 
 
 def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None, **reading) -> str:
@@ -57,16 +58,21 @@ def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None,
     return _described(Path(path), Reading(roles=roles, **reading), by_file)
 
 
-def _described(path: Path, how: Reading, by_file: ByFile | None) -> str:
+def _described(
+    path: Path, how: Reading, by_file: ByFile | None, say: Callable[[str], str] = str
+) -> str:
+    """say : puts what the library says into the words of whom it is told."""
     if not path.is_dir():
         motion, doubts = read_motion(path, Readings(path, [path], how, by_file).of(path))
-        return "\n".join([*_sizes(motion, doubts.values()), "#", *_table(motion.skeleton)])
+        return "\n".join(
+            [*_sizes(motion, map(say, doubts.values())), "#", *_table(motion.skeleton)]
+        )
     files = sorted(file for file in path.rglob("*") if is_motion(file))
     if not files:
         raise MotionFileError(f"{path}: holds no {ENDINGS} file; name one, or a folder of them.")
     report, readings = Report(path, len(files)), Readings(path, files, how, by_file)
     lines = [_line(file, readings.of(file), report) for file in files]
-    return "\n".join([*lines, *report.fitting()])
+    return "\n".join(map(say, [*lines, *report.fitting()]))
 
 
 def _line(file: Path, how: Reading, report: Report) -> str:

@@ -90,5 +90,5 @@ class Report:
         if len(self.faults) == self.files:
             raise DataError(f"{message}\nNone is left; mend them, or name another folder.")
         if not skip_bad:
-            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True (--skip-bad).")
+            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True.")
         warnings.warn(message, stacklevel=stacklevel)

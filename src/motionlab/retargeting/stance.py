@@ -155,19 +155,19 @@ def _of_rig(motions: Sequence[Motion], skeleton: Skeleton) -> tuple[Motion, str]
     turns = _quarter_turns(_together(motions, skeleton), its, skeleton) if drawn else None
     if turns is not None:
         return _standing(its, turns), (
-            "from all its motion together, as its bones lie along them; reference= (--reference) "
+            "from all its motion together, as its bones lie along them; reference= "
             "names a standing clip."
         )
     stance = find_stance(motions)
     if stance is not None:
         return (
             stance,
-            f"where a person stands: {stance.name}; reference= (--reference) names others.",
+            f"where a person stands: {stance.name}; reference= names others.",
         )
     return _standing(its, _together(motions, skeleton)), (
         "from all its motion together, which is less sure, as nobody stands still in it, upright, "
         "with straight legs and arms hanging or spread. If limbs come out turned, give a standing "
-        "clip of the rig as reference= (--reference)."
+        "clip of the rig as reference=."
     )
 
 
