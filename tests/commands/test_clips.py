@@ -178,8 +178,48 @@ def test_one_bad_file_stops_no_other(bad, capsys):
     assert written(bad / "done") == {"a.bvh", "more/b.bvh"}
     assert main(["convert", "clips", "--out", "done", "--skip-bad", "--force"]) == 0
     assert "clips/0.bvh" in capsys.readouterr().out
-    assert main(["convert", "clips", "--out", "done", "--skip-bad"]) == 1  # then all of them failed
-    assert capsys.readouterr().err.count("is there already") == 2
+
+
+@pytest.mark.parametrize("skip", [[], ["--skip-bad"]])
+def test_files_that_are_there_did_not_fail(bad, capsys, skip):
+    """A first run wrote all but the bad one; whoever then does as it says gets on."""
+    command = ["convert", "clips", "--out", "done"]
+    assert main(command) == 1
+    said = capsys.readouterr().err
+    assert "pass --skip-bad" in said and "done again, pass --force" in said
+    assert main([*command, *skip]) == 1
+    said = capsys.readouterr().err
+    assert "clips: 2 of 3 files are not written anew:\n  done/a.bvh: is there already" in said
+    assert said.count("--force overwrites it, another --out leaves it") == 2
+    assert "clips: 1 of 3 files failed:\n  clips/0.bvh" in said and "None was done" not in said
+    write_bvh(WALK, "clips/new.bvh")
+    assert main([*command, *skip]) == 1  # what is new is done all the same
+    assert "done/new.bvh: 30 frames" in capsys.readouterr().out
+    assert main([*command, "--skip-bad", "--force"]) == 0
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_line_says_that_a_body_was_perhaps_read_wrongly(here, capsys, command):
+    """Lying, or of no person's size, it is written like the others, and hangs in the air."""
+    for name, its in {"clips/lies": {"up": "z"}, "clips/small": {"units": "in"}}.items():
+        write_bvh(WALK, f"{name}.bvh", **its)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that axes are a guess
+        assert main([command, "clips", "--out", "done"]) == 0
+    out = [each for each in capsys.readouterr().out.splitlines() if not each.startswith("note: ")]
+    fine, lies, _, small, last = out
+    assert fine.startswith("done/a.bvh: 30 frames")
+    assert lies.startswith("done/lies.bvh: lies throughout: read with --up=z? 30 frames")
+    assert small.startswith("done/small.bvh: of no person's size: read with --units=in? 30 frames")
+    assert last == ("clips: 4 of 4 files are written; perhaps read wrongly: "
+                    "1 lies throughout, 1 of no person's size")  # fmt: skip
+    assert main([command, "clips/lies.bvh", "--up", "z", "--out", "x.bvh"]) == 0
+    assert "x.bvh: 30 frames" in capsys.readouterr().out
+    write_bvh(WALK, "down.bvh", up="-y")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert main([command, "down.bvh", "--out", "y.bvh"]) == 0
+    assert "y.bvh: head down throughout: read with --up=-y?" in capsys.readouterr().out
 
 
 def test_a_folder_into_itself_is_not_read_twice(here):
@@ -325,7 +365,7 @@ def test_a_warning_is_a_line_of_its_own_without_code(here, monkeypatch):
 @pytest.mark.parametrize("way", [["--up", "-z"], ["--up=-z"]])
 def test_an_axis_that_points_down_is_no_option(here, way, capsys):
     assert main(["convert", "walk.bvh", *way, "--out", "x.bvh"]) == 0
-    assert "x.bvh: 30 frames" in capsys.readouterr().out
+    assert " 30 frames at 30 fps" in capsys.readouterr().out
 
 
 def test_formats_that_are_known_to_be_others_are_named(here, capsys):

@@ -6,6 +6,7 @@ folder. A file that can't be read, or fails on the way, stops no other one.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,26 +57,41 @@ class Clips(Taken):
 
         Raises
         ------
-        MotionFileError : nothing can be read, or written where `out` is; at the end, with all
-            faults, unless bad ones are to be skipped.
+        MotionFileError : nothing can be read, or written where `out` is; at the end, if files are
+            there already, or with all faults, unless bad ones are to be skipped.
         """
         pairs = self._pairs(suffix, known)
         files = [file for file, _ in pairs]
         readings = Readings(self.path, files, self.how(), self.answers())
         self.meet(files, readings)
-        report = Report(self.path, len(pairs))
+        report, there, doubtful = Report(self.path, len(pairs)), [], Counter()
         unseen = None if self.path.is_dir() else True  # None: where nobody looks
         with tqdm(total=len(pairs), unit="file", leave=False, disable=unseen) as bar:
             for file, target in pairs:
                 with report.of(file, file.stem):
-                    self._check_target(file, target, [other for _, other in pairs])
-                    motion, said = self.read(file, readings.of(file))
-                    report.doubt(file, said)
-                    tqdm.write(f"{target}: {self._done(do, motion, file, target)}")
+                    if self._is_there(file, target, [other for _, other in pairs]):
+                        there.append(target)
+                    else:
+                        doubtful.update(self._one(file, target, readings.of(file), do, report))
                 bar.update()
         for said in report.notes():
             print(f"note: {as_options(said)}")
-        self._tell([as_options(fault) for fault in report.faults], len(pairs))
+        if doubtful and self.path.is_dir():
+            of = len(pairs) - len(there) - len(report.faults)
+            print(f"{self.path}: {of} of {len(pairs)} files are written; perhaps read wrongly: "
+                  + ", ".join(f"{count} {what}" for what, count in doubtful.items()))  # fmt: skip
+        self._tell([as_options(fault) for fault in report.faults], there, len(pairs))
+
+    def _one(
+        self, file: Path, target: Path, how: Reading, do: Callable, report: Report
+    ) -> list[str]:
+        """Do it to one file and print what was done; returns in what it was perhaps read wrongly."""
+        motion, said = self.read(file, how)
+        report.doubt(file, said)
+        wrong = _read_wrongly(said, how.up)
+        first = [f"{what}: read with {remedy}?" for what, remedy in wrong.items()]
+        tqdm.write(" ".join([f"{target}:", *first, self._done(do, motion, file, target)]))
+        return list(wrong)
 
     @staticmethod
     def _done(do: Callable, motion: Motion, file: Path, target: Path) -> str:
@@ -115,7 +131,8 @@ class Clips(Taken):
             )
         return [(self.path, target)]
 
-    def _check_target(self, file: Path, target: Path, targets: list[Path]) -> None:
+    def _is_there(self, file: Path, target: Path, targets: list[Path]) -> bool:
+        """Whether a file is there that must not be replaced; raises MotionFileError if none can be."""
         if targets.count(target) > 1:
             raise MotionFileError(
                 f"{file}: would become {target}, as another file would whose name differs in its end "
@@ -123,24 +140,47 @@ class Clips(Taken):
             )
         if target.is_dir():
             raise MotionFileError(f"{target}: is a folder; remove it, or name another --out.")
-        if target.exists() and not self.force:
-            raise MotionFileError(
-                f"{target}: is there already; --force replaces it, another --out leaves it."
-            )
+        return target.exists() and not self.force
 
-    def _tell(self, faults: list[str], count: int) -> None:
-        """Raise the faults, or only print them."""
-        if not faults:
+    def _tell(self, faults: list[str], there: list[Path], count: int) -> None:
+        """Raise the faults and what is there already; print faults only that are to be skipped."""
+        old = [
+            f"{target}: is there already; --force overwrites it, another --out leaves it."
+            for target in there
+        ]
+        if not self.path.is_dir():
+            if said := [*old, *faults]:
+                raise MotionFileError(said[0])
             return
-        if count == 1 and not self.path.is_dir():
-            raise MotionFileError(faults[0])
-        message = f"{self.path}: {len(faults)} of {count} files failed:\n  "
-        message += "\n  ".join(faults)
-        if len(faults) == count:
-            raise MotionFileError(f"{message}\nNone was done; mend them, or name another folder.")
-        if not self.skip_bad:
-            raise MotionFileError(f"{message}\nMend or remove them, or pass --skip-bad.")
-        print(message)
+        listed = lambda head, lines: "\n  ".join(
+            [f"{self.path}: {len(lines)} of {count} {head}", *lines]
+        )
+        said = [listed("files are not written anew:", old)] * bool(old)
+        if faults:
+            said.append(listed("files failed:", faults))
+            if len(faults) == count:
+                said.append("None was done; mend them, or name another folder.")
+            elif not self.skip_bad:
+                again = (
+                    f" To write into {self.out} again, pass --force, too, or name another --out."
+                )
+                said.append(f"Mend or remove them, or pass --skip-bad.{again}")
+        if old or (faults and (len(faults) == count or not self.skip_bad)):
+            raise MotionFileError("\n".join(said))
+        if said:
+            print(said[0])
+
+
+def _read_wrongly(said: dict[str, str], up: str | None) -> dict[str, str]:
+    """What a line about a file must not go without, as its body looks as if read wrongly, and the
+    option that mends it; up : the axis that was said to point up."""
+    wrong = {}
+    if fits := getattr(said.get("units"), "fits", ""):
+        wrong["of no person's size"] = as_options(fits)
+    if fits := getattr(said.get("up"), "fits", ""):
+        head_down = fits[-2] == (up or "y")[-1]  # as "up='-y'": the same axis
+        wrong["head down throughout" if head_down else "lies throughout"] = as_options(fits)
+    return wrong
 
 
 def files_of(folder: Path) -> list[Path]:
