@@ -7,6 +7,7 @@ import sys
 import warnings
 
 import pytest
+import rig_names
 
 from motionlab import write_bvh
 from motionlab.__main__ import main
@@ -68,10 +69,28 @@ def test_no_command_speaks_python(here, capsys, heard):
         out = [] if command == "info" else ["--out", f"x{command}"]
         main([command, "odd", *out])
         said = "".join(capsys.readouterr())
-        assert not PYTHON.search(said), said
+        assert not PYTHON.search(said) and "Motion(" not in said, said
         for option in ("--units=in", "--up=z", rate.get(command, "--file-fps=30")):
             assert option in said, (command, option)
     assert main(["info", "odd/rate.bvh"]) == 1
     assert "--file-fps=30" in capsys.readouterr().err
     assert main(["info", "odd/rate.bvh", "--file-fps=30", "--tpose-first"]) == 0
     assert "29 frames, 0.97 s, 30 fps" in capsys.readouterr().out
+
+
+def test_a_clip_is_called_by_its_name(here, capsys, heard):
+    """Not as Python shows it; and what to do comes first."""
+    write_bvh(WALK, "lies.bvh", up="z")
+    assert main(["retarget", "lies.bvh", "--out", "x.bvh"]) == 0
+    said = "".join(capsys.readouterr())
+    (guess,) = [line for line in said.splitlines() if "is a guess" in line]
+    assert guess.startswith("note: lies: read it with another --up if")
+    assert guess.index("pass --reference, a") < guess.index("As it is")
+    for reference, why in (("lies.bvh", "can't tell how"), ("other.bvh", "is of another rig")):
+        if reference == "other.bvh":
+            names = [f"its{name}" for name in WALK.skeleton.names]
+            write_bvh(rig_names.renamed(WALK, names), reference)
+        command = ["retarget", "lies.bvh", "--reference", reference, "--out", "y.bvh"]
+        assert main(command) == 1
+        said = capsys.readouterr().err
+        assert f"The reference {reference[:-4]} {why}" in said and "Motion(" not in said

@@ -37,6 +37,7 @@ class Report:
                 self.faults.append(f"{file}: {self._first(file)}{error}")
         for warning in told:
             said = str(warning.message)
+            said = said.removeprefix(f"{name}: ")  # as its file stands there
             self.doubt(file, {said.replace(repr(name), ""): said})
 
     def doubt(self, file: Path, doubts: dict[str, str]) -> None:

@@ -263,7 +263,7 @@ def _angle(a: Tensor, b: Tensor) -> Tensor:
 
 def _checked(reference: Motion, motions: Sequence[Motion]) -> Motion:
     """The part of a given reference in which a person stands."""
-    label = f"The reference {reference!r}"
+    label = f"The reference {reference.name}".rstrip()
     if not any(_same_rig(reference.skeleton, motion.skeleton) for motion in motions):
         raise RetargetError(
             f"{label} is of another rig than all {len(motions)} clips; give a clip of their rig, "
