@@ -69,8 +69,13 @@ def test_convert_reads_as_it_is_told(here):
 
 def test_root_motion(here, capsys):
     assert main(["convert", "walk.bvh", "--out", "x.bvh", "--root-motion", "ground"]) == 0
-    assert "one root joint more, for way and heading" in capsys.readouterr().out
+    said = "21 joints; below a root joint on the floor, for way and heading\n"
+    assert said in capsys.readouterr().out
     assert same(read_bvh("x.bvh"), WALK) and "ROOT Root" in (here / "x.bvh").read_text()
+    assert main(["convert", "x.bvh", "--out", "z.bvh", "--root-motion", "ground"]) == 0
+    assert said in capsys.readouterr().out  # no second root is added
+    count = lambda file: sum(word in ("ROOT", "JOINT") for word in Path(file).read_text().split())
+    assert count("x.bvh") == count("z.bvh") == 22
     assert main(["convert", "walk.bvh", "--out", "y.bvh", "--root-motion", "in-place"]) == 0
     assert read_bvh("y.bvh").positions()[:, 0, [0, 2]].abs().max() < 1e-4
 
@@ -258,7 +263,11 @@ def test_nothing_is_overwritten_unasked(here, capsys, command):
 BAD = {
     "no such file": (["none.bvh", "--out", "x.bvh"], "none.bvh: there is no such file"),
     "no suffix": (["walk.bvh", "--out", "x"], "x: ends in none of .bvh, .glb"),
-    "another suffix": (["walk.bvh", "--out", "x.fbx"], "name a file such as x.bvh"),
+    "another suffix": (["walk.bvh", "--out", "x.csv"], "name a file such as x.bvh"),
+    "fbx": (
+        ["walk.bvh", "--out", "x.fbx"],
+        "FBX is never written, as its format is not open; write x.glb",
+    ),
     "no folder": (["walk.bvh", "--out", "none/x.bvh"], "there is no folder none; make it"),
     "empty folder": (["empty", "--out", "x"], "empty: holds no file that can be read"),
     "a folder onto a file": (["clips", "--out", "walk.bvh"], "is a folder, so this must name one"),

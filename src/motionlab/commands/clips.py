@@ -121,6 +121,7 @@ class Clips(Taken):
             raise MotionFileError(f"{self.path}: there is no such file or folder.")
         target = self.out / f"{self.path.stem}{suffix}" if self.out.is_dir() else self.out
         if target.suffix.lower() not in known:
+            check_no_fbx(self.out)
             raise MotionFileError(
                 f"--out {self.out}: ends in none of {', '.join(known)}, so it is not known what to "
                 f"write; name a file such as {self.out.with_suffix(suffix)}, or a folder that is there."
@@ -191,6 +192,16 @@ def files_of(folder: Path) -> list[Path]:
             f"{folder}: holds no file that can be read; their names end in {ENDINGS}."
         )
     return found
+
+
+def check_no_fbx(out: Path) -> None:
+    """Raise MotionFileError for a name that asks for FBX."""
+    if out.suffix.lower() == ".fbx":
+        raise MotionFileError(
+            f"--out {out}: FBX is never written, as its format is not open; write "
+            f"{out.with_suffix('.glb')}, which Blender, Unity, Unreal and Godot read, and Blender "
+            "exports it as FBX if need be."
+        )
 
 
 def write(motion: Motion, path: Path, root_motion: str | None = None) -> None:

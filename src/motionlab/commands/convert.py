@@ -153,4 +153,7 @@ def _sizes(before: Motion, after: Motion) -> str:
 def _about_root(root_motion: str | None) -> list[str]:
     if root_motion is None:
         return []
-    return ["in place" if root_motion == "in-place" else "one root joint more, for way and heading"]
+    if root_motion == "in-place":
+        return ["in place"]
+    # whether the file had one or not: it is none of the joints, as reading folds it into the body
+    return ["below a root joint on the floor, for way and heading"]
