@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from ..motion import Motion
     from ..skeleton import Skeleton
 
+_FAULT, _LACKS = (
+    "can't be read (FAULT)",
+    "lack roles that retargeting needs",
+)  # of a folder's last lines
+
 
 @dataclass(kw_only=True)
 class Info(Taken):
@@ -71,19 +76,27 @@ def _described(
     if not files:
         raise MotionFileError(f"{path}: holds no {ENDINGS} file; name one, or a folder of them.")
     report, readings = Report(path, len(files)), Readings(path, files, how, by_file)
-    lines = [_line(file, readings.of(file), report) for file in files]
+    useless: dict[str, list[str]] = {_FAULT: [], _LACKS: []}
+    lines = [_line(file, readings.of(file), report, useless) for file in files]
+    lines += [
+        f"{path}: {len(names)} of {len(files)} files {what}: {', '.join(names)}"
+        for what, names in useless.items()
+        if names
+    ]
     return "\n".join(map(say, [*lines, *report.fitting()]))
 
 
-def _line(file: Path, how: Reading, report: Report) -> str:
-    """One file of a folder in one line."""
-    name = file.relative_to(report.folder)
+def _line(file: Path, how: Reading, report: Report, useless: dict[str, list[str]]) -> str:
+    """One file of a folder in one line; it is listed in `useless` if no network can learn from it."""
+    name = file.relative_to(report.folder).as_posix()
     try:
         motion, doubts = read_motion(file, how)
     except MotionLabError as error:
+        useless[_FAULT].append(name)
         return f"{name}: FAULT {error}"
     report.doubt(file, doubts)
     missing = _missing(motion.skeleton)
+    useless[_LACKS] += [name] * bool(missing)
     said = f"lacks {', '.join(missing)}" if missing else "has all roles that retargeting needs"
     doubtful = [doubt.rstrip(".") for doubt in doubts.values()]
     return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", *doubtful, said])

@@ -66,11 +66,11 @@ class Report:
         return [*notes, *(f"{self.folder}: {said}" for said in self.said)]
 
     def fitting(self) -> list[str]:
-        """Which files another way of reading fits, where it fits several and not all."""
+        """Which files another way of reading fits."""
         return [
             f"{self.folder}: {len(files)} of {self.files} files look like {fits}: {self._names(files)}"
             for (_, fits), files in self._doubts.items()
-            if self._some(fits, files)
+            if fits
         ]
 
     def _some(self, fits: str, files: dict[Path, str]) -> bool:
