@@ -19,6 +19,7 @@ from .commands.convert import Convert, Retarget
 from .commands.evaluate import Evaluate
 from .commands.info import Info
 from .commands.look import Look
+from .commands.options import as_options
 from .commands.prepare import Prepare
 from .commands.reproduce import Reproduce
 from .commands.sample import Sample
@@ -193,10 +194,11 @@ def _downward(arguments: Sequence[str]) -> list[str]:
 
 
 @contextmanager
-def _plain_warnings() -> Iterator[None]:
-    """Warnings as a line for the person who typed the command, without the line of code they came from."""
+def _plain_warnings(rate: str) -> Iterator[None]:
+    """Warnings as a line for the person who typed the command, in its options, without the line of
+    code they came from; rate : as `as_options` takes it."""
     before = warnings.formatwarning
-    warnings.formatwarning = lambda message, *_, **__: f"note: {message}\n"
+    warnings.formatwarning = lambda message, *_, **__: f"note: {as_options(str(message), rate)}\n"
     try:
         yield
     finally:
@@ -215,12 +217,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         args=_downward(sys.argv[1:] if arguments is None else arguments),
         description="Motion data and models.",
     )
+    rate = "--fps" if hasattr(command, "folder") else "--file-fps"  # that of files which are read
     try:
-        with _plain_warnings():
+        with _plain_warnings(rate):
             command.run()
         sys.stdout.flush()
     except MotionLabError as error:
-        print(f"motionlab: {error}", file=sys.stderr)
+        print(f"motionlab: {as_options(str(error), rate)}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130

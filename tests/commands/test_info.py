@@ -74,7 +74,12 @@ def test_a_folder_has_a_line_for_each_file(walk, tmp_path, capsys):
     (tmp_path / "bad.BVH").write_text("HIERARCHY\n")
     (tmp_path / "notes.txt").write_text("no clip")
     assert main(["info", str(tmp_path)]) == 0
-    bad, giant, right, lacking = capsys.readouterr().out.splitlines()
+    bad, giant, right, lacking, *last = capsys.readouterr().out.splitlines()
+    assert last == [
+        f"{tmp_path}: 1 of 4 files can't be read (FAULT): bad.BVH",
+        f"{tmp_path}: 1 of 4 files lack roles that retargeting needs: walk.bvh",
+        f"{tmp_path}: 1 of 4 files look like --units=mm: more/giant.bvh",
+    ]
     assert bad.startswith("bad.BVH: FAULT ") and "bad.BVH" in bad[15:]
     units, roles_ = giant.index("pass another unit"), giant.index("; has all roles")
     assert units < roles_  # what a wrong unit spoils is not worth a look before
@@ -94,9 +99,10 @@ def test_a_mixed_folder_is_sorted_by_what_fits(tmp_path, capsys):
         write_bvh(whole, tmp_path / f"{name}.bvh", units=units)
     write_bvh(whole, tmp_path / "f.bvh", up="z")
     assert main(["info", str(tmp_path)]) == 0
-    *_, metres, millimetres = capsys.readouterr().out.splitlines()
-    assert metres == f"{tmp_path}: 2 of 6 files look like units='m': a.bvh, b.bvh"
-    assert millimetres.endswith("2 of 6 files look like units='mm': c.bvh, d.bvh")
+    *_, metres, millimetres, up = capsys.readouterr().out.splitlines()
+    assert up == f"{tmp_path}: 1 of 6 files look like --up=z: f.bvh"
+    assert metres == f"{tmp_path}: 2 of 6 files look like --units=m: a.bvh, b.bvh"
+    assert millimetres.endswith("2 of 6 files look like --units=mm: c.bvh, d.bvh")
     assert main(["convert", str(tmp_path), "--out", str(tmp_path / "x")]) == 0
     assert "What looks like --units=m: a.bvh, b.bvh." in capsys.readouterr().out
 

@@ -54,10 +54,22 @@ def test_children_and_giants_are_people(height, tmp_path):
 
 
 def test_a_unit_of_its_own_is_told_as_a_number(tmp_path):
-    """As of cmu's files, in 1/0.45 inches."""
-    write_bvh(walk(), tmp_path / "clip.bvh", units=0.056444)
-    with pytest.warns(UserWarning, match=r"none fits.* about units=0\.063"):
+    write_bvh(walk(), tmp_path / "clip.bvh", units=0.005)
+    with pytest.warns(UserWarning, match=r"none fits.* about units=0\.0056"):
         read_bvh(tmp_path / "clip.bvh")
+
+
+@pytest.mark.parametrize("height", [1.15, 1.34, 1.5, 1.8, 2.1])
+def test_cmu_s_unit_is_named(height, tmp_path):
+    """Inches / 0.45; of the tall ones inches would make children."""
+    write_bvh(scaled(height / 1.3446), tmp_path / "clip.bvh", units=0.0254 / 0.45)
+    with pytest.warns(
+        UserWarning, match=r": units=0\.056444, CMU's unit .* makes it " + f"{height:.2f} m"
+    ):
+        read_bvh(tmp_path / "clip.bvh")
+    assert len(
+        read_bvh(tmp_path / "clip.bvh", units=0.056444)
+    )  # without a warning, which fails tests
 
 
 def test_bones_without_length_are_told(tmp_path):

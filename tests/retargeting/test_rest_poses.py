@@ -114,7 +114,7 @@ def test_a_clip_that_is_never_upright_says_so_and_a_reference_helps(turn):
         root_positions=motion.root_positions @ world.mT,
         rotations=torch.cat([world @ motion.rotations[:, :1], motion.rotations[:, 1:]], 1),
     )
-    with pytest.warns(UserWarning, match=r"upright in hardly any.*reference="):
+    with pytest.warns(UserWarning, match=r"another up=.*reference=.*upright in hardly any"):
         guessed = redrawn(down, lying).retarget()
     with warnings.catch_warnings():
         warnings.simplefilter("error")

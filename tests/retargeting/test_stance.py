@@ -143,7 +143,7 @@ def test_where_nobody_stands_all_clips_are_asked_together():
     assert (
         len(stance.motion) == 1
         and "nobody stands" in found.said[0]
-        and "--reference" in found.said[0]
+        and "reference=" in found.said[0]
     )
     axes = [rest_alignment.alignment(clip, CANONICAL, stance.motion) for clip in clips]
     assert all(torch.equal(a[role], axes[0][role]) for a in axes for role in a)

@@ -6,7 +6,7 @@ folder. A file that can't be read, or fails on the way, stops no other one.
 
 from __future__ import annotations
 
-import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,25 +22,20 @@ from ..io.bvh_reading import Reading
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import Readings
 from ..motion import Motion
-from .folder import Files
+from .folder import Taken
+from .options import as_options
 
 WRITERS = {".bvh": write_bvh, ".glb": write_gltf}
 
 
 @dataclass(kw_only=True)
-class Clips(Files):
+class Clips(Taken):
     """A file or a folder of files, and where what becomes of them is written."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
     """What to read; of a folder all files in it and below that can be read."""
     out: Path
     """File to write, or a folder for many; of a file the name's end says what is written."""
-    file_fps: float | None = None
-    """Frames per second of the files, where their own frame time is wrong."""
-    tpose_first: bool = False
-    """Leave out frame 0, a T-pose."""
-    drop_zeros: bool = False
-    """Leave out leading frames in which every rotation is zero."""
     force: bool = False
     """Replace files that are there already."""
     skip_bad: bool = False
@@ -62,27 +57,41 @@ class Clips(Files):
 
         Raises
         ------
-        MotionFileError : nothing can be read, or written where `out` is; at the end, with all
-            faults, unless bad ones are to be skipped.
+        MotionFileError : nothing can be read, or written where `out` is; at the end, if files are
+            there already, or with all faults, unless bad ones are to be skipped.
         """
-        how = self.how(fps=self.file_fps, tpose_first=self.tpose_first, drop_zeros=self.drop_zeros)
         pairs = self._pairs(suffix, known)
         files = [file for file, _ in pairs]
-        readings = Readings(self.path, files, how, self.answers())
+        readings = Readings(self.path, files, self.how(), self.answers())
         self.meet(files, readings)
-        report = Report(self.path, len(pairs))
+        report, there, doubtful = Report(self.path, len(pairs)), [], Counter()
         unseen = None if self.path.is_dir() else True  # None: where nobody looks
         with tqdm(total=len(pairs), unit="file", leave=False, disable=unseen) as bar:
             for file, target in pairs:
                 with report.of(file, file.stem):
-                    self._check_target(file, target, [other for _, other in pairs])
-                    motion, said = self.read(file, readings.of(file))
-                    report.doubt(file, said)
-                    tqdm.write(f"{target}: {self._done(do, motion, file, target)}")
+                    if self._is_there(file, target, [other for _, other in pairs]):
+                        there.append(target)
+                    else:
+                        doubtful.update(self._one(file, target, readings.of(file), do, report))
                 bar.update()
         for said in report.notes():
             print(f"note: {as_options(said)}")
-        self._tell([as_options(fault) for fault in report.faults], len(pairs))
+        if doubtful and self.path.is_dir():
+            of = len(pairs) - len(there) - len(report.faults)
+            print(f"{self.path}: {of} of {len(pairs)} files are written; perhaps read wrongly: "
+                  + ", ".join(f"{count} {what}" for what, count in doubtful.items()))  # fmt: skip
+        self._tell([as_options(fault) for fault in report.faults], there, len(pairs))
+
+    def _one(
+        self, file: Path, target: Path, how: Reading, do: Callable, report: Report
+    ) -> list[str]:
+        """Do it to one file and print what was done; returns in what it was perhaps read wrongly."""
+        motion, said = self.read(file, how)
+        report.doubt(file, said)
+        wrong = _read_wrongly(said, how.up)
+        first = [f"{what}: read with {remedy}?" for what, remedy in wrong.items()]
+        tqdm.write(" ".join([f"{target}:", *first, self._done(do, motion, file, target)]))
+        return list(wrong)
 
     @staticmethod
     def _done(do: Callable, motion: Motion, file: Path, target: Path) -> str:
@@ -112,6 +121,7 @@ class Clips(Files):
             raise MotionFileError(f"{self.path}: there is no such file or folder.")
         target = self.out / f"{self.path.stem}{suffix}" if self.out.is_dir() else self.out
         if target.suffix.lower() not in known:
+            check_no_fbx(self.out)
             raise MotionFileError(
                 f"--out {self.out}: ends in none of {', '.join(known)}, so it is not known what to "
                 f"write; name a file such as {self.out.with_suffix(suffix)}, or a folder that is there."
@@ -122,7 +132,8 @@ class Clips(Files):
             )
         return [(self.path, target)]
 
-    def _check_target(self, file: Path, target: Path, targets: list[Path]) -> None:
+    def _is_there(self, file: Path, target: Path, targets: list[Path]) -> bool:
+        """Whether a file is there that must not be replaced; raises MotionFileError if none can be."""
         if targets.count(target) > 1:
             raise MotionFileError(
                 f"{file}: would become {target}, as another file would whose name differs in its end "
@@ -130,24 +141,47 @@ class Clips(Files):
             )
         if target.is_dir():
             raise MotionFileError(f"{target}: is a folder; remove it, or name another --out.")
-        if target.exists() and not self.force:
-            raise MotionFileError(
-                f"{target}: is there already; --force replaces it, another --out leaves it."
-            )
+        return target.exists() and not self.force
 
-    def _tell(self, faults: list[str], count: int) -> None:
-        """Raise the faults, or only print them."""
-        if not faults:
+    def _tell(self, faults: list[str], there: list[Path], count: int) -> None:
+        """Raise the faults and what is there already; print faults only that are to be skipped."""
+        old = [
+            f"{target}: is there already; --force overwrites it, another --out leaves it."
+            for target in there
+        ]
+        if not self.path.is_dir():
+            if said := [*old, *faults]:
+                raise MotionFileError(said[0])
             return
-        if count == 1 and not self.path.is_dir():
-            raise MotionFileError(faults[0])
-        message = f"{self.path}: {len(faults)} of {count} files failed:\n  "
-        message += "\n  ".join(faults)
-        if len(faults) == count:
-            raise MotionFileError(f"{message}\nNone was done; mend them, or name another folder.")
-        if not self.skip_bad:
-            raise MotionFileError(f"{message}\nMend or remove them, or pass --skip-bad.")
-        print(message)
+        listed = lambda head, lines: "\n  ".join(
+            [f"{self.path}: {len(lines)} of {count} {head}", *lines]
+        )
+        said = [listed("files are not written anew:", old)] * bool(old)
+        if faults:
+            said.append(listed("files failed:", faults))
+            if len(faults) == count:
+                said.append("None was done; mend them, or name another folder.")
+            elif not self.skip_bad:
+                again = (
+                    f" To write into {self.out} again, pass --force, too, or name another --out."
+                )
+                said.append(f"Mend or remove them, or pass --skip-bad.{again}")
+        if old or (faults and (len(faults) == count or not self.skip_bad)):
+            raise MotionFileError("\n".join(said))
+        if said:
+            print(said[0])
+
+
+def _read_wrongly(said: dict[str, str], up: str | None) -> dict[str, str]:
+    """What a line about a file must not go without, as its body looks as if read wrongly, and the
+    option that mends it; up : the axis that was said to point up."""
+    wrong = {}
+    if fits := getattr(said.get("units"), "fits", ""):
+        wrong["of no person's size"] = as_options(fits)
+    if fits := getattr(said.get("up"), "fits", ""):
+        head_down = fits[-2] == (up or "y")[-1]  # as "up='-y'": the same axis
+        wrong["head down throughout" if head_down else "lies throughout"] = as_options(fits)
+    return wrong
 
 
 def files_of(folder: Path) -> list[Path]:
@@ -160,15 +194,16 @@ def files_of(folder: Path) -> list[Path]:
     return found
 
 
+def check_no_fbx(out: Path) -> None:
+    """Raise MotionFileError for a name that asks for FBX."""
+    if out.suffix.lower() == ".fbx":
+        raise MotionFileError(
+            f"--out {out}: FBX is never written, as its format is not open; write "
+            f"{out.with_suffix('.glb')}, which Blender, Unity, Unreal and Godot read, and Blender "
+            "exports it as FBX if need be."
+        )
+
+
 def write(motion: Motion, path: Path, root_motion: str | None = None) -> None:
     """Write a motion as what its name ends in says."""
     WRITERS[path.suffix.lower()](motion, path, root_motion=root_motion)
-
-
-def as_options(text: str) -> str:
-    """What is said of arguments, as ``up='z'``, in the words of the command line: ``--up=z``."""
-    text = re.sub(r"\b(units|up|root|rigid|animation)='([^']*)'", r"--\1=\2", text)
-    text = re.sub(r"\bby_file=", "--by-file", text)
-    text = re.sub(r"(?<![-\w])animation=", "--animation=", text)
-    text = re.sub(r"(?<![-\w])fps=", "--file-fps=", text)
-    return re.sub(r"(?<![-\w])skeleton=", "--skeleton=", text)

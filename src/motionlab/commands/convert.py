@@ -19,7 +19,8 @@ from ..motion import Motion
 from ..retargeting.flat_feet import Stance
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
-from .clips import WRITERS, Clips, as_options, files_of, write
+from .clips import WRITERS, Clips, files_of, write
+from .options import as_options
 from .rig import CANONICAL, Rig, brought_onto
 
 MOST_FPS = 1000  # no one plays more; a slip of the finger would fill the memory
@@ -152,4 +153,7 @@ def _sizes(before: Motion, after: Motion) -> str:
 def _about_root(root_motion: str | None) -> list[str]:
     if root_motion is None:
         return []
-    return ["in place" if root_motion == "in-place" else "one root joint more, for way and heading"]
+    if root_motion == "in-place":
+        return ["in place"]
+    # whether the file had one or not: it is none of the joints, as reading folds it into the body
+    return ["below a root joint on the floor, for way and heading"]

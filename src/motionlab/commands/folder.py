@@ -52,6 +52,23 @@ class Files:
 
 
 @dataclass
+class Taken(Files):
+    """And what of each file is taken; of commands whose own --fps is that of what they write."""
+
+    file_fps: float | None = None
+    """Frames per second of the files, where their own frame time is wrong."""
+    tpose_first: bool = False
+    """Leave out frame 0, a T-pose."""
+    drop_zeros: bool = False
+    """Leave out leading frames in which every rotation is zero."""
+
+    def how(self) -> Reading:
+        return super().how(
+            fps=self.file_fps, tpose_first=self.tpose_first, drop_zeros=self.drop_zeros
+        )
+
+
+@dataclass
 class Folder(Files):
     """Of a folder's files, as `motionlab prepare`, `train` and `evaluate` ask."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,22 +18,28 @@ from ..io.bvh_units import foot_to_head
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import ByFile, Readings
 from ..roles import ALL
-from .folder import Files
+from .folder import Taken
+from .options import as_options
 
 if TYPE_CHECKING:
     from ..motion import Motion
     from ..skeleton import Skeleton
 
+_FAULT, _LACKS = (
+    "can't be read (FAULT)",
+    "lack roles that retargeting needs",
+)  # of a folder's last lines
+
 
 @dataclass(kw_only=True)
-class Info(Files):
+class Info(Taken):
     """What is in a motion file and which joint is understood as what; a line a file for a folder."""
 
     path: Positional[Annotated[Path, arg(metavar="FILE|FOLDER")]]
     """A .bvh, .amc, .glb or .gltf file, or a folder of them."""
 
     def run(self) -> None:
-        print(_described(self.path, self.how(), self.answers()))
+        print(_described(self.path, self.how(), self.answers(), as_options))
 
 
 def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None, **reading) -> str:
@@ -57,27 +63,40 @@ def describe(path: str | os.PathLike, *, roles: Mapping[str, str] | None = None,
     return _described(Path(path), Reading(roles=roles, **reading), by_file)
 
 
-def _described(path: Path, how: Reading, by_file: ByFile | None) -> str:
+def _described(
+    path: Path, how: Reading, by_file: ByFile | None, say: Callable[[str], str] = str
+) -> str:
+    """say : puts what the library says into the words of whom it is told."""
     if not path.is_dir():
         motion, doubts = read_motion(path, Readings(path, [path], how, by_file).of(path))
-        return "\n".join([*_sizes(motion, doubts.values()), "#", *_table(motion.skeleton)])
+        return "\n".join(
+            [*_sizes(motion, map(say, doubts.values())), "#", *_table(motion.skeleton)]
+        )
     files = sorted(file for file in path.rglob("*") if is_motion(file))
     if not files:
         raise MotionFileError(f"{path}: holds no {ENDINGS} file; name one, or a folder of them.")
     report, readings = Report(path, len(files)), Readings(path, files, how, by_file)
-    lines = [_line(file, readings.of(file), report) for file in files]
-    return "\n".join([*lines, *report.fitting()])
+    useless: dict[str, list[str]] = {_FAULT: [], _LACKS: []}
+    lines = [_line(file, readings.of(file), report, useless) for file in files]
+    lines += [
+        f"{path}: {len(names)} of {len(files)} files {what}: {', '.join(names)}"
+        for what, names in useless.items()
+        if names
+    ]
+    return "\n".join(map(say, [*lines, *report.fitting()]))
 
 
-def _line(file: Path, how: Reading, report: Report) -> str:
-    """One file of a folder in one line."""
-    name = file.relative_to(report.folder)
+def _line(file: Path, how: Reading, report: Report, useless: dict[str, list[str]]) -> str:
+    """One file of a folder in one line; it is listed in `useless` if no network can learn from it."""
+    name = file.relative_to(report.folder).as_posix()
     try:
         motion, doubts = read_motion(file, how)
     except MotionLabError as error:
+        useless[_FAULT].append(name)
         return f"{name}: FAULT {error}"
     report.doubt(file, doubts)
     missing = _missing(motion.skeleton)
+    useless[_LACKS] += [name] * bool(missing)
     said = f"lacks {', '.join(missing)}" if missing else "has all roles that retargeting needs"
     doubtful = [doubt.rstrip(".") for doubt in doubts.values()]
     return "; ".join([f"{name}: {_counts(motion)}, {_size(motion)}", *doubtful, said])

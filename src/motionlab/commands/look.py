@@ -7,7 +7,8 @@ from pathlib import Path
 
 from ..io.bvh_reading import Doubts, Reading
 from ..motion import Motion
-from .clips import Clips, as_options
+from .clips import Clips
+from .options import as_options
 
 
 @dataclass(kw_only=True)

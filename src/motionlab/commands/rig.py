@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -16,8 +17,9 @@ from ..motion import Motion
 from ..retargeting.flat_feet import Stance
 from ..retargeting.onto_rig import onto_rig
 from ..skeleton import Skeleton
-from .clips import as_options, write
+from .clips import write
 from .folder import Files
+from .options import as_options
 
 CANONICAL = "canonical"
 
@@ -85,7 +87,7 @@ class Rig:
 
 def _of_the_rig(text: str) -> str:
     """What is said of arguments, as options of the rig."""
-    return as_options(text).replace("--", "--rig-")
+    return re.sub(r"--(units|up|root|animation|rigid|roles)\b(?!-)", r"--rig-\1", as_options(text))
 
 
 def brought_onto(

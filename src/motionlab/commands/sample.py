@@ -14,7 +14,7 @@ from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, TrainingError
 from ..io.root_motion import KINDS
-from .clips import WRITERS
+from .clips import WRITERS, check_no_fbx
 from .rig import Rig, brought_onto
 
 if TYPE_CHECKING:
@@ -144,6 +144,7 @@ class Sample(Rig):
         if not 1 <= self.characters <= 1000:
             raise MotionLabError(f"--characters {self.characters}: must be 1 to 1000.")
         if self.out.suffix.lower() not in WRITERS:
+            check_no_fbx(self.out)
             raise MotionLabError(f"--out {self.out}: the name must end in {' or '.join(WRITERS)}.")
         if self.characters == 1:
             paths = [self.out]

@@ -37,6 +37,7 @@ class Report:
                 self.faults.append(f"{file}: {self._first(file)}{error}")
         for warning in told:
             said = str(warning.message)
+            said = said.removeprefix(f"{name}: ")  # as its file stands there
             self.doubt(file, {said.replace(repr(name), ""): said})
 
     def doubt(self, file: Path, doubts: dict[str, str]) -> None:
@@ -65,11 +66,11 @@ class Report:
         return [*notes, *(f"{self.folder}: {said}" for said in self.said)]
 
     def fitting(self) -> list[str]:
-        """Which files another way of reading fits, where it fits several and not all."""
+        """Which files another way of reading fits."""
         return [
             f"{self.folder}: {len(files)} of {self.files} files look like {fits}: {self._names(files)}"
             for (_, fits), files in self._doubts.items()
-            if self._some(fits, files)
+            if fits
         ]
 
     def _some(self, fits: str, files: dict[Path, str]) -> bool:
@@ -90,5 +91,5 @@ class Report:
         if len(self.faults) == self.files:
             raise DataError(f"{message}\nNone is left; mend them, or name another folder.")
         if not skip_bad:
-            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True (--skip-bad).")
+            raise DataError(f"{message}\nMend or remove them, or pass skip_bad=True.")
         warnings.warn(message, stacklevel=stacklevel)

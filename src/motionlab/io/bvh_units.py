@@ -9,6 +9,9 @@ from ..errors import BvhError
 from ..skeleton import Skeleton
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+# CMU's skeletons say in how many inches they measure: 1 / 0.45. Their BVH files, made of these, have
+# lost that, and no program has a name for it. Rounded, so that it can be typed as it is read.
+CMU = 0.056444
 # Metres along the bones from ankle to head joint. The bodies of our data sets measure 1.34 to 1.80,
 # a small child 0.72. Adults in inches that are read as centimetres measure 0.53 to 0.71.
 HEIGHTS = (0.715, 2.2)
@@ -64,10 +67,15 @@ def doubt_units(skeleton: Skeleton, units: str | float) -> Doubt | str | None:
     said += f" {float(f'{length:.3g}'):g} m in units={units!r}"
     if raw < 1e-9:
         return f"{said}; its bones have no length, export it with its offsets."
-    best = min(UNITS, key=lambda unit: abs(math.log(raw * UNITS[unit] / usual)))
-    if least <= raw * UNITS[best] <= most:
-        fits = f"units={best!r}"
-        better = f"{fits} makes it {raw * UNITS[best]:.2f} m"
+    known = {repr(unit): metres for unit, metres in UNITS.items()}
+    if usual == _USUAL:  # of a whole body; too little is known of others
+        known[str(CMU)] = CMU
+    makes = {unit: raw * metres for unit, metres in known.items() if least <= raw * metres <= most}
+    if makes:
+        best = min(makes, key=lambda unit: abs(math.log(makes[unit] / usual)))
+        fits = f"units={best}"
+        named = ", CMU's unit (inches / 0.45)," if best == str(CMU) else ""
+        better = f"{fits}{named} makes it {makes[best]:.2f} m"
     else:
         fits = f"units={usual / raw:.2g}"
         better = f"of {', '.join(UNITS)} none fits, metres per unit do, about {fits}"

@@ -246,9 +246,10 @@ def _from_motion(motion: Motion, target: Skeleton, roles: list[str]) -> dict[str
         ahead = facing(points, source)
     else:
         warnings.warn(
-            f"{motion!r}: the rest pose is no standing body, and the trunk is upright in hardly any "
-            "frame, so how the axes of the joints lie is a guess; pass reference=, a motion of this "
-            "skeleton in which a person stands upright.",
+            f"{motion.name or 'motion'}: read it with another up= if the person should stand, or pass "
+            "reference=, a motion of this skeleton in which a person stands upright. As it is, the rest "
+            "pose is no standing body and the trunk is upright in hardly any frame, so that how the "
+            "axes of the joints lie is a guess.",
             stacklevel=5,
         )
         left = _across(points, source)

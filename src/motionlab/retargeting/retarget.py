@@ -154,13 +154,15 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
             "retarget to a skeleton in such a pose, such as Skeleton.canonical()."
         )
     if len(motion) == 0:
-        raise RetargetError(f"{motion!r} has no frame to bring to another skeleton.")
+        raise RetargetError(
+            f"{motion.name or 'The motion'} has no frame to bring to another skeleton."
+        )
     if reference is not None and not (
         _moves(reference) and len(reference) and reference.skeleton.names == motion.skeleton.names
     ):
         raise RetargetError(
-            f"The reference {reference!r} must be a motion with a frame and the joints of "
-            f"{motion!r}."
+            f"reference={getattr(reference, 'name', reference)!r} must be a motion with a frame and "
+            f"the joints of {motion.name or 'the motion'}."
         )
 
 

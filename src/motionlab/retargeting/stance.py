@@ -155,19 +155,19 @@ def _of_rig(motions: Sequence[Motion], skeleton: Skeleton) -> tuple[Motion, str]
     turns = _quarter_turns(_together(motions, skeleton), its, skeleton) if drawn else None
     if turns is not None:
         return _standing(its, turns), (
-            "from all its motion together, as its bones lie along them; reference= (--reference) "
+            "from all its motion together, as its bones lie along them; reference= "
             "names a standing clip."
         )
     stance = find_stance(motions)
     if stance is not None:
         return (
             stance,
-            f"where a person stands: {stance.name}; reference= (--reference) names others.",
+            f"where a person stands: {stance.name}; reference= names others.",
         )
     return _standing(its, _together(motions, skeleton)), (
         "from all its motion together, which is less sure, as nobody stands still in it, upright, "
         "with straight legs and arms hanging or spread. If limbs come out turned, give a standing "
-        "clip of the rig as reference= (--reference)."
+        "clip of the rig as reference=."
     )
 
 
@@ -263,7 +263,7 @@ def _angle(a: Tensor, b: Tensor) -> Tensor:
 
 def _checked(reference: Motion, motions: Sequence[Motion]) -> Motion:
     """The part of a given reference in which a person stands."""
-    label = f"The reference {reference!r}"
+    label = f"The reference {reference.name}".rstrip()
     if not any(_same_rig(reference.skeleton, motion.skeleton) for motion in motions):
         raise RetargetError(
             f"{label} is of another rig than all {len(motions)} clips; give a clip of their rig, "
