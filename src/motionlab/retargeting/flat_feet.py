@@ -31,6 +31,8 @@ _RATE = 30.0  # frames looked at in a second
 class Stance:
     """How a rig stands, for `retarget`.
 
+    Attributes
+    ----------
     motion : one in which a person stands; None if the rest pose does, or nothing is known.
     flat : radians by which the toes of the left and right foot, when flat on the floor, point up from
         where they do in `motion`, or at rest; None if each clip is to tell for itself.
