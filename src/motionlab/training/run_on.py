@@ -63,9 +63,10 @@ def strides(clip: Tensor, normalizer: Normalizer, fps: float) -> list[tuple[int,
     A stride (a, b) ends as it begins: frames up to b are like those up to a.
     """
     like, end = round(LIKE * fps), round(END * fps)
-    moments = (
-        normalizer(clip).unfold(0, like, 1).flatten(1)
-    )  # moment i ends with frame i + like - 1
+    if len(clip) < like:
+        return []
+    # moment i ends with frame i + like - 1
+    moments = normalizer(clip).unfold(0, like, 1).flatten(1)
     apart = torch.cdist(moments[-end:], moments) / moments.shape[1] ** 0.5
     last = torch.arange(len(moments))
     ago = last[-end:, None] - last  # (ends, moments) frames from a to b
