@@ -107,6 +107,15 @@ CONVENTIONS = {
 }
 
 
+# The same where names tell sides and little more: bones have to.
+FOREIGN = {
+    "german": "Becken Lende Rücken Hals Kopf Schlüsselbein_@ Oberarm_@ Unterarm_@ Hand_@ "
+    "Oberschenkel_@ Unterschenkel_@ Fuß_@ Zehen_@ links rechts",
+    "numbers": "Kn_M_01 Kn_M_02 Kn_M_03 Kn_M_04 Kn_M_05 arm_@_01 arm_@_02 arm_@_03 arm_@_04 "
+    "leg_@_01 leg_@_02 leg_@_03 leg_@_04 L R",
+}
+
+
 def names_of(convention: str) -> list[str]:
     """The names of the canonical skeleton's joints, in its order."""
     *words, left, right = convention.replace("~", "\0").split()

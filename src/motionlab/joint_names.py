@@ -13,6 +13,9 @@ from functools import lru_cache
 from os.path import commonprefix
 
 SIDES = ("left", "right")
+TRUNK = ("hips", "spine", "chest", "neck", "head")
+ARM = ("shoulder", "upper_arm", "lower_arm", "hand")
+LEG = ("upper_leg", "lower_leg", "foot", "toes")
 
 # What words say of a joint that has a side, and how strongly. A limb is read so that the sum of
 # what its joints say is largest; words that leave a choice must be weaker than those that do not.
@@ -47,10 +50,12 @@ _CENTRAL = {
 }
 LIMB_OF = {word: says for words, says in _PAIRED.items() for word in words.split()}
 TRUNK_OF = {word: role for role, words in _CENTRAL.items() for word in words.split()}
+_OF_SIDES = (
+    "left lft lt l links gauche izquierda izquierdo sinistra sinistro",
+    "right rgt rt r rechts droite derecha derecho destra destro",
+)
 _SIDE_OF = {
-    word: side
-    for side, words in zip(SIDES, ("left lft lt l", "right rgt rt r"), strict=True)
-    for word in words.split()
+    word: side for side, words in zip(SIDES, _OF_SIDES, strict=True) for word in words.split()
 }
 # MikuMikuDance's, longer words before those that they hold
 _JAPANESE = dict(
@@ -77,6 +82,8 @@ def _tokens(name: str) -> tuple[str, ...]:
     name = unicodedata.normalize("NFKC", name)
     for word, english in _JAPANESE.items():
         name = name.replace(word, f" {english} ")
+    marks = unicodedata.normalize("NFD", name)  # of Rücken no "r" is left alone
+    name = "".join(letter for letter in marks if not unicodedata.combining(letter))
     name = re.sub(r"\[[A-Za-z ]*\]", " ", name)  # Skyrim's "NPC L Thigh [LThg]"
     name = re.sub(r"FBXASC\d{3}", " ", name)  # how FBX writes blanks, dots and the like
     name = re.sub(r"(?i)(?<![a-z])lf(?![a-z])", "left", name)  # but LFArm is a left forearm

@@ -33,7 +33,9 @@ Then the tree: down a leg come upper leg, lower leg, foot and toes, down an arm 
 lower arm and hand, and of two joints that could be either the upper one is it, or the one whose name
 has nothing left out (CMU's ``LeftHip``, which hangs on a ``LHipJoint``). Hips are where both
 legs meet, whatever they are called, one joint between shin and toes is the foot, the chest is where the arms branch off, the spine is the first
-joint from the one to the other, the neck carries the head.
+joint from the one to the other, the neck carries the head. Of limbs whose names say too little
+(``leg_L_01`` to ``leg_L_04``, or words of another language) the bones tell: of the two chains on each
+side the leg is the one nearer to the root, and its two longest bones are thigh and shin.
 
 What is understood wrongly or not at all is said with ``roles={"left_foot": "LFoot"}``; ``motionlab
 info FILE`` shows what was understood.
@@ -47,32 +49,36 @@ import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from itertools import chain
 from pathlib import Path
 
 from .errors import SkeletonError
-from .joint_names import CLEAR, LIMB_OF, NEARLY_ALL, SIDES, TRUNK_OF, readings
+from .joint_names import ARM, CLEAR, LEG, LIMB_OF, NEARLY_ALL, SIDES, TRUNK, TRUNK_OF, readings
+from .joint_tree import between, by_place, limb, trunk
 
-TRUNK = ("hips", "spine", "chest", "neck", "head")
-ARM = ("shoulder", "upper_arm", "lower_arm", "hand")
-LEG = ("upper_leg", "lower_leg", "foot", "toes")
 ALL = TRUNK + tuple(f"{side}_{part}" for side in SIDES for part in ARM + LEG)
+_OF_LIMBS = tuple(f"{side}_{part}" for side in SIDES for part in ARM[1:] + LEG[:3])
 _SAID = 1000  # weight of what was said, more than all names of a limb together
 
 
 class Roles(dict):
-    """Joint index of each role that a skeleton has; `given` are those that were said by name."""
+    """Joint index of each role that a skeleton has; `given` are those that were said by name, `placed`
+    those that no name says and the lengths of bones tell."""
 
-    def __init__(self, found: Mapping[str, int], given: Mapping[str, str]) -> None:
+    def __init__(
+        self, found: Mapping[str, int], given: Mapping[str, str], placed: Sequence[str] = ()
+    ) -> None:
         super().__init__(found)
-        self.given = dict(given)
+        self.given, self.placed = dict(given), tuple(placed)
 
     def __reduce__(self):
-        return Roles, (dict(self), self.given)
+        return Roles, (dict(self), self.given, self.placed)
 
 
 def find(
-    names: Sequence[str], parents: Sequence[int], given: Mapping[str, str] | None = None
+    names: Sequence[str],
+    parents: Sequence[int],
+    given: Mapping[str, str] | None = None,
+    lengths: Sequence[float] = (),
 ) -> Roles:
     """Joint of each role, as ``{"left_foot": 16}``, in the order of the joints.
 
@@ -81,46 +87,81 @@ def find(
     names, parents : as a `Skeleton`'s.
     given : joints by role, as ``{"left_foot": "LFoot"}``, which win over what is understood; a role
         that no joint has is ``""``.
+    lengths : of each joint's offset from its parent (joints,), in any unit. Without them no limb is
+        told by its bones where names leave it open.
 
     Raises
     ------
     SkeletonError : `given` names a role or a joint that there is not, or one joint twice.
     """
     given = given.given if isinstance(given, Roles) else given
-    said = _check(given, names)
-    found = _find(tuple(names), tuple(parents), tuple(said.items()))
-    return Roles(dict(found), given or {})
+    rig = tuple(names), tuple(parents), tuple(_check(given, names).items())
+    found, placed = dict(_find(*rig)), ()
+    if len(lengths) and any(role not in found for role in _OF_LIMBS):
+        sides = [side for side, *_ in readings(rig[0])]
+        named, placed = found, by_place(sides, parents, lengths)
+        found = dict(_find(*rig, tuple(placed.items())))
+        placed = [role for role in found if role in placed and named.get(role) != found[role]]
+    return Roles(found, given or {}, placed)
 
 
 @lru_cache(256)  # the clips of a data set have few skeletons
 def _find(
-    names: tuple[str, ...], parents: tuple[int, ...], given: tuple[tuple[str, int | None], ...]
+    names: tuple[str, ...],
+    parents: tuple[int, ...],
+    given: tuple[tuple[str, int | None], ...],
+    placed: tuple[tuple[str, int], ...] = (),
 ) -> tuple[tuple[str, int], ...]:
-    """The roles and their joints; given : those that were said, None for a role without a joint."""
+    """The roles and their joints; given : those that were said, None for a role without a joint;
+    placed : joints of limbs by their place, for limbs that names leave open."""
     said = dict(given)
     sides, words, left_out = zip(*readings(names), strict=True)
     counts = Counter(token for rest in left_out for token in set(rest))
     common = {token for token, n in counts.items() if n >= NEARLY_ALL * len(names)}
     plain = [not any(map(str.isalpha, {*rest} - common)) for rest in left_out]
+    silent = [word not in LIMB_OF and word not in TRUNK_OF for word in words]
     limbs: dict[str, int] = {}
-    for side in SIDES:
-        own = [word if s == side else "" for s, word in zip(sides, words, strict=True)]
-        for parts in (ARM, LEG):
-            limb = _limb(_weights(own, plain, parts, side, said), parents, parts)
-            silent = [
-                s in (None, side) and word not in LIMB_OF and word not in TRUNK_OF
-                for s, word in zip(sides, words, strict=True)
-            ]
+    for parts in (ARM, LEG):
+        both: dict[str, int] = {}
+        for side in SIDES:
+            own = [word if s == side else "" for s, word in zip(sides, words, strict=True)]
+            found = limb(_weights(own, plain, parts, side, said), parents, parts)
+            mute = [s in (None, side) and quiet for s, quiet in zip(sides, silent, strict=True)]
             free = [part for part in parts if f"{side}_{part}" not in said]
-            limb |= _between(limb, silent, parents, parts, free)
-            limbs |= {f"{side}_{part}": joint for part, joint in limb.items()}
+            found |= between(found, mute, parents, parts, free)
+            both |= {f"{side}_{part}": joint for part, joint in found.items()}
+        limbs |= _or_placed(both, dict(placed), parts, said, list(zip(sides, words, strict=True)))
     taken = {*limbs.values(), *said.values()}
     kinds = [
         None if side or joint in taken else word
         for joint, (side, word) in enumerate(zip(sides, words, strict=True))
     ]
-    found = limbs | _trunk(limbs, kinds, parents, said)
+    found = limbs | trunk(limbs, kinds, parents, said, dict(placed))
     return tuple(sorted(found.items(), key=lambda item: item[1]))
+
+
+def _or_placed(
+    named: dict[str, int],
+    placed: Mapping[str, int],
+    parts: Sequence[str],
+    said: Mapping[str, int | None],
+    words: Sequence[tuple[str | None, str]],
+) -> dict[str, int]:
+    """Both sides of a limb as names have it, or by its place, where names lack a joint that a limb
+    can't do without, nothing was said of it and no clear word speaks against it."""
+    every = {f"{side}_{part}" for side in SIDES for part in parts}
+    lacks = any(role in every and role not in named for role in _OF_LIMBS)
+    if not lacks or every & {*said} or not every & {*placed}:
+        return named
+    role_of = {joint: role for role, joint in placed.items() if role in every}
+    for joint, (side, word) in enumerate(words):
+        if words.count((side, word)) > 1:  # arm_L_01 and arm_L_02
+            continue
+        says = {f"{side}_{part}": weight for part, weight in LIMB_OF.get(word, {}).items()}
+        clear = any(role in every and weight >= CLEAR for role, weight in says.items())
+        if clear and role_of.get(joint) not in says:
+            return named
+    return {role: joint for joint, role in role_of.items()}
 
 
 def partners(names: Sequence[str], roles: Mapping[str, int]) -> tuple[int, ...]:
@@ -187,9 +228,6 @@ def table(path: str | os.PathLike, example: str) -> object:
     return found
 
 
-# -- the tree -------------------------------------------------------------------------------------
-
-
 def _check(given: Mapping[str, str] | None, names: Sequence[str]) -> dict[str, int | None]:
     """Joint index by role of what was said; None where no joint has the role."""
     if given is None:
@@ -231,120 +269,3 @@ def _weights(
             says = {part: _SAID} if part in parts else {}
         weights.append(says)
     return weights
-
-
-def _limb(
-    weights: list[dict[str, int]], parents: Sequence[int], parts: Sequence[str]
-) -> dict[str, int]:
-    """Joint of each part of a limb: the parts in their order down one chain, at most weight.
-
-    Parts that do not hang on that chain are taken from wherever their name is clear.
-    """
-    count = len(parts)
-    # of what hangs below each joint (and, last, below nothing): the best from part k on
-    below = [[(0, ())] * (count + 1) for _ in range(len(parents) + 1)]
-    for joint in reversed(range(len(parents))):
-        own, above = list(below[joint]), below[parents[joint]]
-        for k in range(count):
-            for m in range(k, count):
-                if weight := weights[joint].get(parts[m]):
-                    score, rest = below[joint][m + 1]
-                    own[k] = max((weight + score, ((parts[m], joint), *rest)), own[k], key=_score)
-        for k in range(count):
-            above[k] = max(own[k], above[k], key=_score)  # of equals the first joint
-    found = dict(below[-1][0][1])
-    if not {"shoulder", "lower_arm"} & {*found} and "upper_arm" in found:
-        if "shoulder" in weights[found["upper_arm"]]:  # and no elbow hangs on it
-            found["shoulder"] = found.pop("upper_arm")
-    for part in parts:
-        if part not in found:
-            clear = (j for j, says in enumerate(weights) if says.get(part, 0) >= CLEAR)
-            joint = next((j for j in clear if j not in found.values()), None)
-            found |= {} if joint is None else {part: joint}
-    return found
-
-
-def _between(
-    limb: Mapping[str, int],
-    silent: Sequence[bool],
-    parents: Sequence[int],
-    parts: Sequence[str],
-    free: Sequence[str],
-) -> dict[str, int]:
-    """Parts that are missing between two others of a limb, where one joint alone lies between them
-    whose name is `silent` (joints,): what hangs on a shin and carries toes is a foot."""
-    found = {}
-    for above, part, below in zip(parts, parts[1:], parts[2:], strict=False):
-        if part in free and part not in limb and above in limb and below in limb:
-            joint = parents[limb[below]]
-            if joint >= 0 and silent[joint] and parents[joint] == limb[above]:
-                found[part] = joint
-    return found
-
-
-def _score(best: tuple[int, tuple]) -> int:
-    return best[0]
-
-
-def _trunk(
-    limbs: Mapping[str, int],
-    words: Sequence[str | None],
-    parents: Sequence[int],
-    said: Mapping[str, int | None],
-) -> dict[str, int]:
-    """Joint of each role of the trunk. words : each joint's, None where it is none of the trunk."""
-    kinds = [TRUNK_OF.get(word) for word in words]
-    every = range(len(kinds))
-    found: dict[str, int] = {}
-
-    def settle(role: str, *choices: list[int]) -> None:
-        taken = {*limbs.values(), *said.values(), *found.values()}
-        free = (joint for joint in chain(*choices) if joint not in taken)
-        if (joint := said.get(role, next(free, None))) is not None:
-            found[role] = joint
-
-    of = lambda kind, among=every: [joint for joint in among if kinds[joint] == kind]
-    legs, arms = (_meeting(limbs, part, parents) for part in ("upper_leg", "upper_arm"))
-    settle("hips", legs[-1:], [j for j in of("hips") if words[j] != "root"], of("hips"))
-    hips = _line(found.get("hips"), parents)
-    # a root may carry all limbs itself, and Biped's neck carries the arms, another rig's neck_base
-    arms = [joint for joint in arms if joint not in hips and "neck" not in (words[joint] or "")]
-    settle("chest", arms[-1:], of("chest"))
-    chest = _line(found.get("chest"), parents)
-    between = [joint for joint in chest[:-1] if joint not in hips] if hips else []
-    named = [j for j in (between if hips and chest else every) if kinds[j] in ("spine", "chest")]
-    settle("spine", named, between)
-
-    top = _below(found["chest"], parents) if chest else every
-    spines = of("spine", top) if arms else []
-    spines = spines if len(spines) > 1 else []  # Rigify's go on to the head
-    settle("head", of("head", top), of("head"), spines[-1:])
-    neck = _line(found.get("head"), parents)[:-1]
-    silent = [j for j in neck if chest and j in top and words[j] is not None and kinds[j] is None]
-    named = spines[:1] if found.get("head") in spines else []
-    settle("neck", of("neck", neck), of("neck", top), of("neck"), named, silent[-1:])
-    return found
-
-
-def _line(joint: int | None, parents: Sequence[int]) -> list[int]:
-    """The joints from the root down to one, both included."""
-    line = []
-    while joint is not None and joint >= 0:
-        line.append(joint)
-        joint = parents[joint]
-    return line[::-1]
-
-
-def _meeting(limbs: Mapping[str, int], part: str, parents: Sequence[int]) -> list[int]:
-    """The joints above both sides' part, from the root down to where they meet."""
-    left, right = (_line(limbs.get(f"{side}_{part}"), parents) for side in SIDES)
-    return [a for a, b in zip(left, right, strict=False) if a == b]
-
-
-def _below(joint: int, parents: Sequence[int]) -> list[int]:
-    """The joints that hang on one, at any depth."""
-    inside = {joint}
-    for other, parent in enumerate(parents):
-        if parent in inside:
-            inside.add(other)
-    return sorted(inside - {joint})

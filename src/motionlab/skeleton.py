@@ -60,7 +60,9 @@ class Skeleton:
         orders = _words(self.rotation_orders, "rotation_orders")
         set_("rotation_orders", orders or ("ZXY",) * len(self.names))
         self._check()
-        set_("roles", find(self.names, self.parents, self.roles))
+        set_(
+            "roles", find(self.names, self.parents, self.roles, self.offsets.norm(dim=-1).tolist())
+        )
 
     def _check(self) -> None:
         count = len(self.names)

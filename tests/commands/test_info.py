@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 
 import pytest
 import rig_names
@@ -16,10 +17,14 @@ from motionlab.errors import BvhError
 
 @pytest.fixture
 def walk(tmp_path):
-    """A clip whose left ankle and hand are called as nobody calls them."""
+    """A clip whose left shin, ankle and hand are called as nobody calls them; forearms are so short
+    that bones do not tell either."""
     motion = gaits.make(seconds=1, name="walk")
     odd = {"LeftLowerLeg": "Rod", "LeftFoot": 'Paw "1"', "LeftHand": "Claw"}
     names = [odd.get(name, name) for name in motion.skeleton.names]
+    offsets = motion.skeleton.offsets.clone()
+    offsets[[motion.skeleton.role(f"{side}_hand") for side in roles.SIDES]] /= 2
+    motion = replace(motion, skeleton=replace(motion.skeleton, offsets=offsets))
     path = tmp_path / "walk.bvh"
     write_bvh(rig_names.renamed(motion, names), path)
     return path
@@ -36,6 +41,14 @@ def test_what_it_says_of_a_file(walk):
     assert "".join(wanted) in needs and "right_hand" not in needs
     # the hands keep their side in the mirror, which makes a body of it that is none
     assert 'without a partner on the other: "Claw", "RightHand", "Rod", "Paw_' in text
+
+
+def test_what_bones_tell_is_said(tmp_path):
+    names = rig_names.names_of(rig_names.FOREIGN["numbers"])
+    write_bvh(rig_names.renamed(gaits.make(seconds=1), names), tmp_path / "walk.bvh")
+    text = describe(tmp_path / "walk.bvh")
+    assert 'left_foot = "leg_L_03"' in text and "Retargeting has all the roles" in text
+    assert "# Told by the lengths of bones, not by names: neck, head, left_shoulder, left_" in text
 
 
 def test_it_can_be_mended_and_given_back(walk, tmp_path, capsys):

@@ -251,7 +251,7 @@ def test_the_inches_of_a_tall_adult_are_noticed(tmp_path):
 @pytest.mark.parametrize("units, said", [("cm", []), ("m", [True]), ("mm", [True])])
 def test_wrong_units_are_noticed_where_feet_are_not_known(tmp_path, units, said):
     body = Skeleton.canonical()
-    names = [re.sub("Foot$", "_17", re.sub("Toes$", "_18", name)) for name in body.names]
+    names = [re.sub("Foot$", "Toe", re.sub("Toes$", "_18", name)) for name in body.names]
     body = replace(body, names=names, roles=None)
     still = Motion(body, torch.zeros(2, 3), torch.eye(3).expand(2, 21, 3, 3), fps=30)
     assert "left_foot" not in still.skeleton.roles

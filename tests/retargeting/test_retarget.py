@@ -223,10 +223,11 @@ def test_mirrored_and_turned_sources_give_mirrored_and_turned_results(gait):
 
 
 def without(motion: Motion, *names: str) -> Motion:
-    """The motion with joints that mean nothing to anyone."""
+    """The motion with joints that have no role, as it is said."""
     s = motion.skeleton
     odd = tuple(f"bone{i}" if name in names else name for i, name in enumerate(s.names))
-    body = Skeleton(odd, s.parents, 1.1 * s.offsets, s.end_parents, s.end_offsets)
+    none = {role: "" for role, joint in s.roles.items() if s.names[joint] in names}
+    body = Skeleton(odd, s.parents, 1.1 * s.offsets, s.end_parents, s.end_offsets, roles=none)
     return replace(motion, skeleton=body, root_positions=1.1 * motion.root_positions)
 
 

@@ -148,6 +148,10 @@ def _table(skeleton: Skeleton) -> list[str]:
     others = [
         role for role in ALL if role not in {*skeleton.roles, *skeleton.roles.given, *missing}
     ]
+    if skeleton.roles.placed:
+        lines.append(
+            f"# Told by the lengths of bones, not by names: {', '.join(skeleton.roles.placed)}."
+        )
     if others:
         lines.append(f"# There may also be: {', '.join(others)}.")
     if skeleton.without_partner:

@@ -19,6 +19,7 @@ In this order:
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -116,6 +117,18 @@ def _moves(value: object) -> bool:
     return isinstance(getattr(value, "skeleton", None), Skeleton)
 
 
+def _tell_placed(name: str, skeleton: Skeleton) -> None:
+    """That joints were told by their bones, which a rig with joints of its own can mislead."""
+    if placed := skeleton.roles.placed:
+        found = ", ".join(f"{role} = {skeleton.names[skeleton.roles[role]]}" for role in placed)
+        warnings.warn(
+            f"Names of the {name} do not tell which joint is which; by the lengths of bones it is "
+            f"{found}. Look whether it moves well; roles=, or on the command line --roles, with a table "
+            "that `motionlab info` prints, says it for certain.",
+            stacklevel=5,
+        )
+
+
 def _same_body(one: Skeleton, other: Skeleton) -> bool:
     """Whether two skeletons differ in the names of their joints alone, not in what these mean."""
     if one.joints != other.joints or one.roles != other.roles:
@@ -141,6 +154,7 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
                     f"The {name} has no bone from {joint} to {child}: the one must hang on the "
                     f"other, at least {100 * SHORT:g} cm away."
                 )
+        _tell_placed(name, its)
     if any(skeleton.below("hips", f"{side}_upper_leg") is None for side in SIDES):
         raise RetargetError("The target skeleton's upper legs do not hang on its hips.")
     if any(bone(skeleton, f"{side}_foot", f"{side}_toes") is None for side in SIDES):
