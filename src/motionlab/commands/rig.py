@@ -22,6 +22,7 @@ from .folder import Files
 from .options import as_options
 
 CANONICAL = "canonical"
+_DEEP = 0.05  # metres below the floor that are told
 
 
 @dataclass(kw_only=True)
@@ -101,7 +102,8 @@ def brought_onto(
     if found is motion:
         return motion, ["is on that rig already"]
     name = "the canonical body" if rig is None else rig.name
-    return found, [f"onto {name}{_lengths(motion.skeleton, found.skeleton)}"]
+    said = f"onto {name}{_lengths(motion.skeleton, found.skeleton)}"
+    return found, [said, *_dips(motion, found)]
 
 
 def _lengths(before: Skeleton, after: Skeleton) -> str:
@@ -109,3 +111,23 @@ def _lengths(before: Skeleton, after: Skeleton) -> str:
     if None in heights:
         return ""
     return ", from foot to head {:.2f} m and now {:.2f} m".format(*heights)
+
+
+def _dips(before: Motion, after: Motion) -> list[str]:
+    """What comes to lie below the floor on another body: feet alone are kept above it."""
+    roles = after.skeleton.roles
+    feet = {joint for role, joint in roles.items() if role.endswith(("_foot", "_toes"))}
+    others = [joint for joint in roles.values() if joint not in feet]
+    low, frames = after.positions()[:, others, 1].min(0)
+    depth, which = (-low).max(0)
+    if depth < _DEEP or depth < _depth(before) + _DEEP:
+        return []
+    joint, second = after.skeleton.names[others[which]], float(frames[which]) / after.fps
+    return [f"{joint} up to {100 * depth:.0f} cm below the floor (at {second:.1f} s)"]
+
+
+def _depth(motion: Motion) -> float:
+    """How far, in metres, joints go below the lowest place of the feet."""
+    roles, heights = motion.skeleton.roles, motion.positions()[..., 1]
+    feet = [joint for role, joint in roles.items() if role.endswith(("_foot", "_toes"))]
+    return float(heights[:, feet].min() - heights[:, list(roles.values())].min())
