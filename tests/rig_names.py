@@ -111,6 +111,10 @@ CONVENTIONS = {
 FOREIGN = {
     "german": "Becken Lende Rücken Hals Kopf Schlüsselbein_@ Oberarm_@ Unterarm_@ Hand_@ "
     "Oberschenkel_@ Unterschenkel_@ Fuß_@ Zehen_@ links rechts",
+    "korean": "골반 척추 가슴 목 머리 어깨_@ 위팔_@ 아래팔_@ 손_@ 허벅지_@ 종아리_@ 발_@ 발가락_@ L R",
+    "mgear": "spine_C0_pelvis_jnt spine_C0_01_jnt spine_C0_03_jnt neck_C0_0_jnt neck_C0_head_jnt "
+    "shoulder_@0_0_jnt arm_@0_0_jnt arm_@0_1_jnt arm_@0_end_jnt leg_@0_0_jnt leg_@0_1_jnt "
+    "leg_@0_end_jnt foot_@0_0_jnt L R",
     "numbers": "Kn_M_01 Kn_M_02 Kn_M_03 Kn_M_04 Kn_M_05 arm_@_01 arm_@_02 arm_@_03 arm_@_04 "
     "leg_@_01 leg_@_02 leg_@_03 leg_@_04 L R",
 }

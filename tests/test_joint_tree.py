@@ -116,6 +116,29 @@ def test_a_clear_word_in_another_place_wins():
     assert "left_upper_leg" not in found and "left_upper_arm" in found
 
 
+@pytest.mark.parametrize(
+    ("names", "wanted"),
+    [
+        ("leg_0 leg_1 leg_end foot_0", "upper_leg lower_leg foot toes"),
+        ("thigh shin b17 foot", "upper_leg lower_leg foot toes"),
+        ("shoulder biceps2 forearm hand", "shoulder upper_arm lower_arm hand"),
+        ("shoulder upperarm forearm hand", "shoulder upper_arm lower_arm hand"),
+        ("hip shin foot toe", "upper_leg lower_leg foot toes"),
+        ("thigh shin toe b1", "upper_leg lower_leg toes -"),
+    ],
+)
+def test_bones_settle_what_words_leave_open(names, wanted):
+    """A shoulder is a collar or an upper arm, a foot the ankle's joint or the toes below it."""
+    parts = names.split()
+    whole = [*CANONICAL.names]
+    at = CANONICAL.role("left_shoulder" if "shoulder" in parts else "left_upper_leg")
+    whole[at : at + 8] = [f"{part}_{side}" for side in "LR" for part in parts]
+    found = {
+        joint: role for role, joint in replace(CANONICAL, names=whole, roles=None).roles.items()
+    }
+    assert [found.get(at + i, "left_-") for i in range(4)] == [f"left_{p}" for p in wanted.split()]
+
+
 def test_what_is_said_of_a_limb_keeps_the_tree_out_of_it():
     names, parents, lengths, wanted = rig(ARM, LEG)
     said = {"left_toes": ""}

@@ -35,7 +35,7 @@ _PAIRED = {
     "bigtoe": {"toes": 38},
     "collar collarbone clavicle clav scapula": {"shoulder": 40},
     "shoulder shldr": {"shoulder": 30, "upper_arm": 31},
-    "upperarm uparm uarm armupper humerus": {"upper_arm": 40},
+    "upperarm uparm uarm armupper humerus bicep biceps": {"upper_arm": 40},
     "arm": {"upper_arm": 35, "lower_arm": 25},
     "forearm farm lowerarm lowarm loarm armlower elbow radius ulna": {"lower_arm": 40},
     "hand wrist": {"hand": 40},
@@ -84,11 +84,14 @@ def _tokens(name: str) -> tuple[str, ...]:
         name = name.replace(word, f" {english} ")
     marks = unicodedata.normalize("NFD", name)  # of Rücken no "r" is left alone
     name = "".join(letter for letter in marks if not unicodedata.combining(letter))
+    name = unicodedata.normalize("NFC", name)
     name = re.sub(r"\[[A-Za-z ]*\]", " ", name)  # Skyrim's "NPC L Thigh [LThg]"
     name = re.sub(r"FBXASC\d{3}", " ", name)  # how FBX writes blanks, dots and the like
     name = re.sub(r"(?i)(?<![a-z])lf(?![a-z])", "left", name)  # but LFArm is a left forearm
-    parts = [part for part in re.split(r"[:|]", name) if re.search("[A-Za-z]", part)]
-    found = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", parts[-1] if parts else "")
+    parts = [part for part in re.split(r"[:|]", name) if re.search(r"[^\W\d_]", part)]
+    found = re.findall(
+        r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+", parts[-1] if parts else ""
+    )
     return tuple(token.lower() for token in found)
 
 

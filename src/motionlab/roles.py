@@ -16,7 +16,7 @@ name that says more, as ``LeftFootIK`` or ``LeftHandThumb1``, gets no role::
     foot          ankle talocrural; foot, which is the toes below an ankle
     toes          toe toes toebase ball bigtoe forefoot footindex
     shoulder      collar collarbone clavicle clav scapula; shoulder shldr
-    upper arm     upperarm uparm uarm armupper humerus arm; shoulder shldr, below a collar or
+    upper arm     upperarm uparm uarm armupper humerus bicep biceps arm; shoulder shldr, below a collar or
                   right above an elbow
     lower arm     forearm farm lowerarm lowarm loarm armlower elbow radius ulna; arm, below another
     hand          hand wrist
@@ -35,7 +35,9 @@ has nothing left out (CMU's ``LeftHip``, which hangs on a ``LHipJoint``). Hips a
 legs meet, whatever they are called, one joint between shin and toes is the foot, the chest is where the arms branch off, the spine is the first
 joint from the one to the other, the neck carries the head. Of limbs whose names say too little
 (``leg_L_01`` to ``leg_L_04``, or words of another language) the bones tell: of the two chains on each
-side the leg is the one nearer to the root, and its two longest bones are thigh and shin.
+side the leg is the one nearer to the root, and its two longest bones are thigh and shin; what hangs
+on an ankle without a name is no foot though it be called so. `Roles.placed` names what was told so,
+and `retarget` warns of it. No clear word is overruled.
 
 What is understood wrongly or not at all is said with ``roles={"left_foot": "LFoot"}``; ``motionlab
 info FILE`` shows what was understood.
@@ -55,7 +57,8 @@ from .errors import SkeletonError
 from .joint_names import ARM, CLEAR, LEG, LIMB_OF, NEARLY_ALL, SIDES, TRUNK, TRUNK_OF, readings
 from .joint_tree import between, by_place, limb, trunk
 
-ALL = TRUNK + tuple(f"{side}_{part}" for side in SIDES for part in ARM + LEG)
+_SIDED = tuple(f"{side}_{part}" for side in SIDES for part in ARM + LEG)
+ALL = TRUNK + _SIDED
 _OF_LIMBS = tuple(f"{side}_{part}" for side in SIDES for part in ARM[1:] + LEG[:3])
 _SAID = 1000  # weight of what was said, more than all names of a limb together
 
@@ -97,7 +100,7 @@ def find(
     given = given.given if isinstance(given, Roles) else given
     rig = tuple(names), tuple(parents), tuple(_check(given, names).items())
     found, placed = dict(_find(*rig)), ()
-    if len(lengths) and any(role not in found for role in _OF_LIMBS):
+    if len(lengths) and any(role not in found for role in _SIDED):
         sides = [side for side, *_ in readings(rig[0])]
         named, placed = found, by_place(sides, parents, lengths)
         found = dict(_find(*rig, tuple(placed.items())))
@@ -147,19 +150,24 @@ def _or_placed(
     said: Mapping[str, int | None],
     words: Sequence[tuple[str | None, str]],
 ) -> dict[str, int]:
-    """Both sides of a limb as names have it, or by its place, where names lack a joint that a limb
-    can't do without, nothing was said of it and no clear word speaks against it."""
+    """Both sides of a limb as names have it; or by its place, where names lack a part, what they have
+    is not enough or elsewhere, nothing was said of it and no clear word speaks against it."""
     every = {f"{side}_{part}" for side in SIDES for part in parts}
-    lacks = any(role in every and role not in named for role in _OF_LIMBS)
-    if not lacks or every & {*said} or not every & {*placed}:
-        return named
     role_of = {joint: role for role, joint in placed.items() if role in every}
+    needs = any(role in every and role not in named for role in _OF_LIMBS)
+    # or names fit, but a joint too high or too low: what hangs on an unknown ankle is called foot
+    shifts = not every <= {*named} and any(
+        role in named and named[role] != joint for joint, role in role_of.items()
+    )
+    if not role_of or every & {*said} or not (needs or shifts):
+        return named
     for joint, (side, word) in enumerate(words):
-        if words.count((side, word)) > 1:  # arm_L_01 and arm_L_02
-            continue
         says = {f"{side}_{part}": weight for part, weight in LIMB_OF.get(word, {}).items()}
+        first = words.index((side, word)) == joint
+        if not first or (len(says) > 1 and words.count((side, word)) > 1):
+            continue  # arm_L_02 after arm_L_01; of toe_L and toe_L_end the first one counts
         clear = any(role in every and weight >= CLEAR for role, weight in says.items())
-        if clear and role_of.get(joint) not in says:
+        if (clear or (says and joint in role_of)) and role_of.get(joint) not in says:
             return named
     return {role: joint for joint, role in role_of.items()}
 
