@@ -176,5 +176,11 @@ def test_foreign_names_are_understood_and_that_is_told(convention):
         said.retarget()
 
 
+def test_long_chains_take_no_long_time():
+    """Each joint of the other side than the one above it, so that a limb may begin anywhere."""
+    names = [f"b{joint}_{'LR'[joint % 2]}" for joint in range(1500)]
+    assert "left_foot" not in roles.find(names, range(-1, 1499), None, [1.0] * 1500)
+
+
 def test_words_of_other_alphabets_have_no_letters_left_alone():
     assert roles.sided(["Rücken", "Länge", "Épaule.L"]) == (False, False, True)

@@ -65,10 +65,10 @@ def by_place(
     that stand out.
     """
     found: dict[str, int] = {}
-    shapes = []
+    shapes, hung = [], _hung(parents)
     for side in SIDES:
         starts = [j for j, s in enumerate(sides) if s == side and _sided(parents[j], sides) != side]
-        chains = [line for line in (_stem(j, parents) for j in starts) if len(line) >= 3]
+        chains = [line for line in (_stem(j, hung) for j in starts) if len(line) >= 3]
         if len(chains) != 2:
             return {}
         leg, arm = sorted(chains, key=lambda line: len(_line(parents[line[0]], parents)))
@@ -84,30 +84,39 @@ def by_place(
             found |= {f"{side}_{part}": joint for part, joint in own.items()}
     if shapes[:2] != shapes[2:]:
         return {}
-    return found | _crown(_meeting(found, ARM[1], parents)[-1], sides, parents, lengths)
+    return found | _crown(_meeting(found, ARM[1], parents)[-1], sides, hung, lengths)
 
 
 def _sided(joint: int, sides: Sequence[str | None]) -> str | None:
     return sides[joint] if joint >= 0 else None
 
 
-def _stem(joint: int, parents: Sequence[int]) -> list[int]:
+def _hung(parents: Sequence[int]) -> list[list[int]]:
+    """The joints that hang on each joint."""
+    hung: list[list[int]] = [[] for _ in parents]
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            hung[parent].append(joint)
+    return hung
+
+
+def _stem(joint: int, hung: list[list[int]]) -> list[int]:
     """The joints from one down to where the tree branches, single joints that hang there aside."""
     line = [joint]
     while True:
-        below = [child for child, parent in enumerate(parents) if parent == line[-1]]
-        below = [child for child in below if child in parents] if len(below) > 1 else below
+        below = hung[line[-1]]
+        below = [child for child in below if hung[child]] if len(below) > 1 else below
         if len(below) != 1:
             return line
         line += below
 
 
 def _crown(
-    chest: int, sides: Sequence[str | None], parents: Sequence[int], lengths: Sequence[float]
+    chest: int, sides: Sequence[str | None], hung: list[list[int]], lengths: Sequence[float]
 ) -> dict[str, int]:
     """Neck and head, if two joints alone go up from where the arms meet, or a third one on them whose
     way is longer than from neck to head, as a tip's is."""
-    alone = [_stem(j, parents) for j, p in enumerate(parents) if p == chest and sides[j] is None]
+    alone = [_stem(joint, hung) for joint in hung[chest] if sides[joint] is None]
     if len(alone) != 1 or not 2 <= len(alone[0]) <= 3:
         return {}
     neck, head, *tip = alone[0]
