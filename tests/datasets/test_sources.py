@@ -15,7 +15,10 @@ from motionlab.datasets import registry
 from motionlab.errors import DataError
 
 # requests leaves a socket to the garbage collector if the server says 404
-pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:.*from frame 0 to frame 1"),  # the toy take begins at rest
+]
 UNIT = 0.0254 / 0.45  # metres
 TAKE = tiny_bvh(200, 1)
 AMC = tiny_acclaim.amc(tiny_acclaim.sway(30)).encode()

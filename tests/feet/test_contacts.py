@@ -175,8 +175,8 @@ def test_heights_of_the_rest_pose():
 def test_real_clips_of_every_source_get_contacts(real_clips):
     for source, clips in real_clips.items():
         for path, data in clips.items():
-            motion = parse_bvh(data, path, units=sources()[source].units)
-            motion = motion[10:] if len(motion) > 20 else motion  # calibration poses
+            motion = parse_bvh(data, path, units=sources()[source].units, tpose_first=True)
+            motion = motion[9:] if len(motion) > 20 else motion  # calibration poses
             for rule in contacts.RULES:
                 found = contacts.label(motion, rule)
                 assert found.shape == (len(motion), 4), path

@@ -181,8 +181,9 @@ def test_who_stands_up_once_is_no_body_of_another_axis(upright, told, tmp_path):
     rotations[upright:, 0] = matrix("z").T @ rotations[upright:, 0]
     write_bvh(replace(motion, rotations=rotations), tmp_path / "clip.bvh")
     if told:
-        with pytest.warns(UserWarning, match="up='z'"):
+        with pytest.warns(UserWarning) as warned:  # of the jump, too
             read_bvh(tmp_path / "clip.bvh")
+        assert any("up='z'" in str(each.message) for each in warned)
     else:
         read_bvh(tmp_path / "clip.bvh")
 

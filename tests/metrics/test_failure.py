@@ -41,8 +41,11 @@ def captured(real_clips):
     """Real clips, each with limits from the others of its source: styles of walks, and dances."""
     found = []
     for source in ("bandai-locomotion", "aclstm-cmu"):
-        motions = [parse_bvh(data, path, units=0.01) for path, data in real_clips[source].items()]
-        motions = [m[8:].resample(30) for m in motions]
+        motions = [
+            parse_bvh(data, path, units=0.01, tpose_first=True)
+            for path, data in real_clips[source].items()
+        ]
+        motions = [m[7:].resample(30) for m in motions]
         clips = [m.positions()[:600] for m in motions]
         for i, clip in enumerate(clips):
             others = clips[:i] + clips[i + 1 :]

@@ -29,8 +29,11 @@ def looped(clip, start, period, times, shift=0):
 def captured(real_clips):
     found = []
     for source in ("bandai-locomotion", "accad", "aclstm-cmu"):
-        motions = [parse_bvh(data, path, units=0.01) for path, data in real_clips[source].items()]
-        motions = [m[8:].resample(30) for m in motions]
+        motions = [
+            parse_bvh(data, path, units=0.01, tpose_first=True)
+            for path, data in real_clips[source].items()
+        ]
+        motions = [m[7:].resample(30) for m in motions]
         found += [(m.positions()[:450], m.skeleton) for m in motions if m.seconds > 3]
     return found
 

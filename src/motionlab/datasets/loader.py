@@ -166,14 +166,16 @@ def parse(clip: Clip, data: bytes, *besides: bytes) -> Motion:
     """A clip from the bytes of its file and of those besides it."""
     names = {"where": clip.path, "source": clip.source}
     how = {"units": sources()[clip.source].units, "up": "y", "fps": clip.fps}
+    how["tpose_first"] = clip.skip > 0  # as the table knows; a take's later parts skip more
+    first = clip.skip - how["tpose_first"]
     match PurePosixPath(clip.path).suffix:
         case ".res":
-            motion = parse_take(data, **names)
+            motion, first = parse_take(data, **names), clip.skip
         case ".amc":
             motion = parse_amc(data, *besides, **names, **how)
         case _:
             motion = parse_bvh(data, **names, **how)
-    return replace(motion[clip.skip : clip.skip + clip.frames], name=clip.name)
+    return replace(motion[first : first + clip.frames], name=clip.name)
 
 
 def _gaits(split: str | None, clips: Sequence[str] | None) -> list[Motion]:

@@ -26,6 +26,7 @@ from .bvh_text import opened
 from .bvh_units import doubt_units, in_metres
 from .bvh_up import doubt_up, turn_up
 from .euler import from_euler
+from .first_pose import doubt_first
 from .rigid import RIGID
 
 _INCH = 0.0254
@@ -205,6 +206,7 @@ def _made(
     motion = turn_up(motion, how.up)
     said = {"units": doubt_units(motion.skeleton, float(f"{metres:.6g}"))}
     said["up"] = doubt_up(motion, how.up)
+    said["first"] = doubt_first(motion, how.tpose_first or how.drop_zeros)
     return motion, {about: text for about, text in said.items() if text}
 
 

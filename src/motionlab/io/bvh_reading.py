@@ -22,6 +22,7 @@ from .bvh_text import decode, last_line, opened, parse_rows, split
 from .bvh_units import doubt_units, in_metres, is_positive
 from .bvh_up import check_up, doubt_up, turn_up
 from .euler import from_euler
+from .first_pose import doubt_first
 
 # What to say to the reader of a file, by what it is about: "units", "up", "frames", ...
 Doubts = dict[str, str]
@@ -91,6 +92,7 @@ def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, D
     doubts |= body.doubts
     doubts["units"] = doubt_units(motion.skeleton, units)
     doubts["up"] = doubt_up(motion, how.up)
+    doubts["first"] = doubt_first(motion, how.tpose_first or how.drop_zeros)
     return motion, {about: said for about, said in doubts.items() if said}
 
 

@@ -16,6 +16,7 @@ from .bvh_reading import Doubts, Reading, frames_to_skip
 from .bvh_text import opened
 from .bvh_units import doubt_units, in_metres
 from .bvh_up import doubt_up, turn_up
+from .first_pose import doubt_first
 from .gltf_file import LARGEST, File, brief
 from .gltf_keys import Track, frames, moved, tracks
 from .gltf_nodes import Nodes, Place
@@ -59,6 +60,7 @@ def parse(
     still = turn_up(body.motion(body.still, np.zeros(1), fps, Reading()), how.up)
     if doubt_up(still, how.up):
         doubts["up"] = doubt_up(motion, how.up)  # of one who crouches the pose at rest is upright
+    doubts["first"] = doubt_first(motion, how.tpose_first or how.drop_zeros)
     return motion, {about: said for about, said in doubts.items() if said}
 
 

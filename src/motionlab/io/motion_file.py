@@ -46,10 +46,11 @@ def is_bvh(path: str | os.PathLike) -> bool:
 
 def read_rig(path: str | os.PathLike, how: Reading) -> tuple[Motion, Doubts]:
     """`read_motion` of a file that stands for its rig, which an Acclaim skeleton does by itself: it
-    is read as one frame, at rest."""
+    is read as one frame, at rest. That its first frame is a pose apart is no fault of a rig."""
     if Path(path).suffix.lower() == ".asf":
         return acclaim.read_rest(path, how)
-    return read_motion(path, how)
+    motion, doubts = read_motion(path, how)
+    return motion, {about: said for about, said in doubts.items() if about != "first"}
 
 
 def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tuple[Motion, Doubts]:
