@@ -52,7 +52,7 @@ def real_motions(real_clips) -> dict[str, list[Motion]]:
     """At most 200 frames of each real clip, in metres, by source."""
     return {
         source: [
-            parse_bvh(data, path, units=sources()[source].units)[:200]
+            parse_bvh(data, path, units=sources()[source].units, tpose_first=True)[:200]
             for path, data in clips.items()
         ]
         for source, clips in real_clips.items()

@@ -298,7 +298,8 @@ def test_real_clips_of_every_source(real_clips):
     units = {"cmu": 0.05644444}
     for source, clips in real_clips.items():
         path, data = list(clips.items())[1]
-        motion = parse_bvh(data, path, units=units.get(source, 0.01), source=source)[1:]
+        how = {"units": units.get(source, 0.01), "source": source, "tpose_first": True}
+        motion = parse_bvh(data, path, **how)
         motion = motion.resample(30)[:150]
         found = retarget(motion)
         assert found.skeleton is CANONICAL and len(found) == len(motion)
