@@ -62,7 +62,7 @@ def rig(
 def test_limbs_are_told_by_their_bones(data):
     """With or without collar, hip joint, toes and tips; long bones of some variety."""
     pick = lambda *of: data.draw(st.sampled_from(of))
-    stretch = st.floats(0.88, 1.12)
+    stretch = st.floats(0.94, 1.06)
     arm = {part: length * data.draw(stretch) for part, length in ARM.items()}
     leg = {part: length * data.draw(stretch) for part, length in LEG.items()}
     if pick(True, False):
@@ -85,6 +85,9 @@ def test_limbs_are_told_by_their_bones(data):
         (ARM, {"*a": 0.1, "*b": 0.21, "*c": 0.21, "*d": 0.44, "*e": 0.15}, "a thigh in two"),
         (ARM, {"*a": 0.1, "*b": 0.21, "*c": 0.21, "*d": 0.22, "*e": 0.22}, "both in two"),
         (ARM, {"*a": 0.1, "*b": 0.3}, "a leg of two joints"),
+        (ARM, {"*a": 0.1, "*b": 0.42, "*c": 0.31, "*d": 0.13, "*e": 0.15}, "a joint in the shin"),
+        (ARM, {"*a": 0.1, "*b": 0.42, "*c": 0.36, "*d": 0.06, "*e": 0.15}, "one at its end"),
+        (ARM, {"*a": 0.1, "*b": 0.42, "*c": 0.36, "*d": 0.06}, "and no toes"),
         ({"*a": 0.1, "*b": 0.1, "*c": 0.1, "*d": 0.1}, LEG, "bones that are all alike"),
     ],
 )
@@ -139,10 +142,14 @@ def test_bones_settle_what_words_leave_open(names, wanted):
     assert [found.get(at + i, "left_-") for i in range(4)] == [f"left_{p}" for p in wanted.split()]
 
 
-def test_what_is_said_of_a_limb_keeps_the_tree_out_of_it():
+def test_what_is_said_of_a_limb_and_fits_leaves_the_rest_to_the_bones():
     names, parents, lengths, wanted = rig(ARM, LEG)
-    said = {"left_toes": ""}
-    found = roles.find(names, parents, said, lengths)
+    some = {role: names[wanted[role]] for role in ("left_toes", "right_foot", "left_hand")}
+    assert roles.find(names, parents, some, lengths) == wanted
+    none = roles.find(names, parents, {"left_toes": ""}, lengths)
+    assert none == {role: joint for role, joint in wanted.items() if role != "left_toes"}
+    other = {"left_foot": names[wanted["left_toes"]]}  # which the bones do not bear out
+    found = roles.find(names, parents, other, lengths)
     assert "left_upper_leg" not in found and found["left_hand"] == wanted["left_hand"]
 
 
@@ -155,7 +162,10 @@ def test_chains_of_one_word_and_a_number():
     assert skeleton.roles == CANONICAL.roles
     bent = replace(skeleton, offsets=100 * skeleton.offsets)  # in centimetres, too
     assert bent.roles == CANONICAL.roles
-    assert "left_foot" not in replace(skeleton, offsets=torch.zeros(21, 3)).roles
+    flat = replace(skeleton, offsets=torch.zeros(21, 3))
+    assert not {"left_foot", "left_upper_arm", "left_upper_leg"} & {
+        *flat.roles
+    }  # nor by their words
 
 
 @pytest.mark.parametrize("convention", rig_names.FOREIGN)
@@ -166,7 +176,9 @@ def test_foreign_names_are_understood_and_that_is_told(convention):
     motion = rig_names.renamed(gait, rig_names.names_of(rig_names.FOREIGN[convention]))
     assert motion.skeleton.roles == CANONICAL.roles
     assert motion.skeleton.mirror_partners == CANONICAL.mirror_partners
-    with pytest.warns(UserWarning, match="by the lengths of bones it is .*left_foot = .*--roles"):
+    with pytest.warns(
+        UserWarning, match="by the lengths of bones it is .*left_foot = .*roles=, with a table"
+    ):
         found = motion.retarget()
     assert torch.equal(found.positions(), gait.retarget().positions())
     told = {role: motion.skeleton.names[joint] for role, joint in motion.skeleton.roles.items()}

@@ -90,7 +90,8 @@ def test_names_of_other_letters_and_endless_ones():
     assert roles.find(names, [-1, 0, 0, 0, 0, 0]) == {}
     assert roles.partners(names, {}) == tuple(range(6))
     chain = [f"left_leg_{i}" for i in range(2000)]
-    assert len(roles.find(chain, range(-1, 1999))) == 2
+    assert roles.find(chain, range(-1, 1999)) == {}  # which of them?
+    assert len(roles.find(chain[:2], [-1, 0])) == 2
 
 
 # -- the tree -------------------------------------------------------------------------------------

@@ -10,8 +10,9 @@ from itertools import chain, pairwise
 
 from .joint_names import ARM, CLEAR, LEG, SIDES, TRUNK_OF
 
-_LIKE = 0.6  # of the two long bones of a limb the shorter is this share of the other at least
+_LIKE = 0.75  # of the two long bones of a limb the shorter is this share of the other at least
 _LONG = 0.75  # and any other bone of the limb is at most this share of the shorter one
+_FOOT = 0.2  # of the longer one a foot has this share at least, and its toes are no longer than it
 
 
 def limb(
@@ -76,7 +77,7 @@ def by_place(
             return {}
         for parts, upper, line in ((ARM, 1, arm), (LEG, 0, leg)):
             first = _long_bones(line, lengths)
-            if first is None:
+            if first is None or (parts is LEG and not _ends_in_a_foot(line[first:], lengths)):
                 return {}
             line = line[max(first - upper, 0) :]
             own = dict(zip(parts[max(upper - first, 0) :], line, strict=False))
@@ -132,6 +133,12 @@ def _long_bones(line: list[int], lengths: Sequence[float]) -> int | None:
     others = bones[:first] + bones[first + 2 :]
     alike = 0 < short and short >= _LIKE * long
     return first if alike and all(bone <= _LONG * short for bone in others) else None
+
+
+def _ends_in_a_foot(leg: list[int], lengths: Sequence[float]) -> bool:
+    """Whether what follows thigh and shin may be a foot, and no joint low in the shin."""
+    long, *rest = max(lengths[joint] for joint in leg[1:3]), *(lengths[j] for j in leg[3:])
+    return not rest or (rest[0] >= _FOOT * long and (len(rest) == 1 or rest[1] <= rest[0]))
 
 
 def between(

@@ -128,6 +128,7 @@ def _find(
         both: dict[str, int] = {}
         for side in SIDES:
             own = [word if s == side else "" for s, word in zip(sides, words, strict=True)]
+            own = ["" if _open(word, own) else word for word in own]
             found = limb(_weights(own, plain, parts, side, said), parents, parts)
             mute = [s in (None, side) and quiet for s, quiet in zip(sides, silent, strict=True)]
             free = [part for part in parts if f"{side}_{part}" not in said]
@@ -143,6 +144,11 @@ def _find(
     return tuple(sorted(found.items(), key=lambda item: item[1]))
 
 
+def _open(word: str, own: Sequence[str]) -> bool:
+    """Whether more joints of a side have a word than it has meanings, as arm_L_01 to arm_L_04."""
+    return own.count(word) > len(LIMB_OF.get(word, ())) > 1
+
+
 def _or_placed(
     named: dict[str, int],
     placed: Mapping[str, int],
@@ -151,7 +157,7 @@ def _or_placed(
     words: Sequence[tuple[str | None, str]],
 ) -> dict[str, int]:
     """Both sides of a limb as names have it; or by its place, where names lack a part, what they have
-    is not enough or elsewhere, nothing was said of it and no clear word speaks against it."""
+    is not enough or elsewhere, and neither what was said nor a clear word speaks against it."""
     every = {f"{side}_{part}" for side in SIDES for part in parts}
     role_of = {joint: role for role, joint in placed.items() if role in every}
     needs = any(role in every and role not in named for role in _OF_LIMBS)
@@ -159,7 +165,9 @@ def _or_placed(
     shifts = not every <= {*named} and any(
         role in named and named[role] != joint for joint, role in role_of.items()
     )
-    if not role_of or every & {*said} or not (needs or shifts):
+    agree = all(placed.get(role) == joint for role, joint in said.items()
+                if role in every and joint is not None)  # fmt: skip
+    if not role_of or not agree or not (needs or shifts):
         return named
     for joint, (side, word) in enumerate(words):
         says = {f"{side}_{part}": weight for part, weight in LIMB_OF.get(word, {}).items()}
@@ -169,7 +177,7 @@ def _or_placed(
         clear = any(role in every and weight >= CLEAR for role, weight in says.items())
         if (clear or (says and joint in role_of)) and role_of.get(joint) not in says:
             return named
-    return {role: joint for joint, role in role_of.items()}
+    return {role: joint for joint, role in role_of.items() if said.get(role, joint) is not None}
 
 
 def partners(names: Sequence[str], roles: Mapping[str, int]) -> tuple[int, ...]:

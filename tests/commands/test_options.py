@@ -44,7 +44,9 @@ def test_one_word_for_the_other(said, typed):
 
 def test_a_table_is_a_file():
     said = as_options("Say which with read_bvh(path, roles={'hips': 'NAME'}).")
-    assert said.startswith("Say which with --roles=rig.toml, ") and 'hips = "NAME"' in said
+    assert said == 'Say which with --roles=rig.toml (a file with lines such as hips = "NAME").'
+    told = "The target skeleton has no joint for hips. Say it with roles={'hips': 'NAME'}."
+    assert " with --rig-roles=rig.toml (" in as_options(told)  # which is told of a rig
 
 
 @pytest.fixture

@@ -22,5 +22,5 @@ def test_what_dips_below_the_floor_is_told():
     assert lowest > 10
     assert len(said) == 2 and said[1].endswith(" s)")
     assert f"Hand up to {lowest:.0f} cm below the floor (at 0." in said[1]
-    assert len(brought_onto(ape, None)[1]) == 1  # as deep as before or less is no news
+    assert len(brought_onto(ape, None)[1]) == 1  # on arms of a person's length they are above it
     assert len(brought_onto(walk, replace(ape, skeleton=walk.skeleton))[1]) == 1

@@ -38,6 +38,23 @@ def test_a_tpose_is_told_at_any_rate_pace_and_unit(fps, speed, scale):
     assert doubt_first(with_tpose(walk), said=True) is None
 
 
+@pytest.mark.parametrize("frames", [2, 10, 100])
+def test_a_tpose_that_is_held_is_told_too(frames):
+    walk = with_tpose(gaits.make(seconds=6))
+    held = [0] * frames + list(range(1, len(walk)))
+    walk = replace(walk, rotations=walk.rotations[held], root_positions=walk.root_positions[held])
+    for said in (False, True):
+        assert "drop_zeros=True" in (told := doubt_first(walk, said))
+        assert f"frames 0 to {frames - 1} are one pose" in told
+
+
+def test_who_stands_still_and_walks_off_is_left_alone():
+    walk = replace(gaits.make(seconds=3), contacts=None)
+    held = [0] * 20 + list(range(1, len(walk)))
+    walk = replace(walk, rotations=walk.rotations[held], root_positions=walk.root_positions[held])
+    assert doubt_first(walk, said=False) is None
+
+
 def test_it_is_told_where_files_are_read(tmp_path):
     write_bvh(with_tpose(gaits.make(seconds=1)), tmp_path / "a.bvh")
     write_gltf(with_tpose(gaits.make(seconds=1)), tmp_path / "a.glb")

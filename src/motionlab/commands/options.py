@@ -26,12 +26,14 @@ def as_options(text: str, rate: str = "--file-fps") -> str:
 
     rate : the option that stands for ``fps=``, the rate at which files are read.
     """
-    text = _ROLES.sub(r'--roles=rig.toml, a file with lines such as \1 = "NAME",', text)
+    text = _ROLES.sub(r'--roles=rig.toml (a file with lines such as \1 = "NAME")', text)
     text = _VALUE.sub(lambda m: f"{_option(m[1])}={shlex.quote(m[2].strip(_quote(m[2])))}", text)
     text = _SWITCH.sub(lambda m: f"--{'no-' * (m[2] == 'False')}{_option(m[1])[2:]}", text)
-    return _BARE.sub(
+    text = _BARE.sub(
         lambda m: (rate if m[1] == "fps" else _option(m[1])) + "=" * (m[2] is not None), text
     )
+    # which a command is told of a rig has options of its own
+    return text.replace("--roles", "--rig-roles") if "target skeleton" in text else text
 
 
 def _option(name: str) -> str:

@@ -103,7 +103,7 @@ def brought_onto(
         return motion, ["is on that rig already"]
     name = "the canonical body" if rig is None else rig.name
     said = f"onto {name}{_lengths(motion.skeleton, found.skeleton)}"
-    return found, [said, *_dips(motion, found)]
+    return found, [said, *_dips(found)]
 
 
 def _lengths(before: Skeleton, after: Skeleton) -> str:
@@ -113,21 +113,14 @@ def _lengths(before: Skeleton, after: Skeleton) -> str:
     return ", from foot to head {:.2f} m and now {:.2f} m".format(*heights)
 
 
-def _dips(before: Motion, after: Motion) -> list[str]:
+def _dips(motion: Motion) -> list[str]:
     """What comes to lie below the floor on another body: feet alone are kept above it."""
-    roles = after.skeleton.roles
+    roles = motion.skeleton.roles
     feet = {joint for role, joint in roles.items() if role.endswith(("_foot", "_toes"))}
     others = [joint for joint in roles.values() if joint not in feet]
-    low, frames = after.positions()[:, others, 1].min(0)
+    low, frames = motion.positions()[:, others, 1].min(0)
     depth, which = (-low).max(0)
-    if depth < _DEEP or depth < _depth(before) + _DEEP:
+    if depth < _DEEP:
         return []
-    joint, second = after.skeleton.names[others[which]], float(frames[which]) / after.fps
+    joint, second = motion.skeleton.names[others[which]], float(frames[which]) / motion.fps
     return [f"{joint} up to {100 * depth:.0f} cm below the floor (at {second:.1f} s)"]
-
-
-def _depth(motion: Motion) -> float:
-    """How far, in metres, joints go below the lowest place of the feet."""
-    roles, heights = motion.skeleton.roles, motion.positions()[..., 1]
-    feet = [joint for role, joint in roles.items() if role.endswith(("_foot", "_toes"))]
-    return float(heights[:, feet].min() - heights[:, list(roles.values())].min())

@@ -1,4 +1,4 @@
-"""A first frame that is no part of the motion: the T-pose by which a body was calibrated."""
+"""First frames that are no part of the motion: the T-pose by which a body was calibrated."""
 
 from __future__ import annotations
 
@@ -6,31 +6,42 @@ from torch import Tensor
 
 from ..motion import Motion
 
+_HELD = 120  # frames for which it may be held
 _AFTER, _NEXT = (
     4,
-    14,
-)  # frames with whose steps the first one is compared: filters blur it over some
-_TIMES = 4.0  # as far as the largest of these; of 1456 real clips none does
+    13,
+)  # frames after it with whose steps its own is compared; filters blur the first
+_TIMES = 4.0  # as far as the largest of these; of 1457 real clips none does
 _FAR = 0.03  # of the body's extent, mean of all joints
+_STILL = 1e-4  # of the same: so still is no living body
 
 
 def doubt_first(motion: Motion, said: bool) -> str | None:
-    """What to say if the body jumps from frame 0 to frame 1 and goes on smoothly from there.
+    """What to say if the body holds a pose, jumps to another and goes on smoothly from there.
 
-    motion : as read, with all frames; said : how it begins was said, so nothing is asked.
+    motion : as read; said : that it begins with one frame of it was said, so of one nothing is asked.
     """
-    if said or len(motion) < _NEXT:
-        return None
-    points = motion[:_NEXT].positions()
+    points = motion[: _HELD + _NEXT].positions()
     pose = points - points[:, :1]
     steps = pose.diff(dim=0).norm(dim=-1).mean(-1)
-    first, largest = float(steps[0]), float(steps[_AFTER:].max())
-    if first <= _FAR * _extent(points[1]) or first < _TIMES * largest:
+    extent = _extent(points[0])
+    held = int((steps <= _STILL * extent).long().cumprod(0).sum())
+    if len(steps) < held + _NEXT - 1 or held >= _HELD or (said and held == 0):
         return None
+    first, largest = float(steps[held]), float(steps[held + _AFTER : held + _NEXT].max())
+    if first <= _FAR * extent or first < _TIMES * largest:
+        return None
+    times = (
+        f"{min(first / max(largest, 1e-9), 99):.0f} times as far as between any frames soon after"
+    )
+    if held:
+        return (
+            f"frames 0 to {held} are one pose, and from there the body's joints jump {times}: if the body "
+            "was calibrated by it, leave them out, of a pose without any turn with drop_zeros=True."
+        )
     return (
-        f"from frame 0 to frame 1 the body's joints jump {min(first / max(largest, 1e-9), 99):.0f} times "
-        "as far as between any frames soon after: if frame 0 is a pose by which the body was "
-        "calibrated, leave it out with tpose_first=True."
+        f"from frame 0 to frame 1 the body's joints jump {times}: if frame 0 is a pose by which the body "
+        "was calibrated, leave it out with tpose_first=True."
     )
 
 

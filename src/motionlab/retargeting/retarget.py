@@ -123,8 +123,8 @@ def _tell_placed(name: str, skeleton: Skeleton) -> None:
         found = ", ".join(f"{role} = {skeleton.names[skeleton.roles[role]]}" for role in placed)
         warnings.warn(
             f"Names of the {name} do not tell which joint is which; by the lengths of bones it is "
-            f"{found}. Look whether it moves well; roles=, or on the command line --roles, with a table "
-            "that `motionlab info` prints, says it for certain.",
+            f"{found}. Look whether it moves well; roles=, with a table that `motionlab info` prints, says "
+            "it for certain.",
             stacklevel=5,
         )
 
@@ -144,8 +144,8 @@ def _check(motion: Motion, skeleton: Skeleton, reference: Motion | None) -> None
             raise RetargetError(
                 f"The {name} has no joint for {', '.join(missing)}; its joints are "
                 f"{', '.join(its.names)}. Understood: {found or 'none'}. Say the others where the "
-                f"skeleton is made or read, as read_bvh(path, roles={{{missing[0]!r}: 'NAME'}}), on the "
-                "command line with --roles; `motionlab info FILE` shows and explains the table."
+                f"skeleton is made or read, as read_bvh(path, roles={{{missing[0]!r}: 'NAME'}}); "
+                "`motionlab info FILE` shows and explains the table."
             )
         for joint, child in _BONES:
             offset = its.below(joint, child)
