@@ -55,6 +55,13 @@ def test_who_stands_still_and_walks_off_is_left_alone():
     assert doubt_first(walk, said=False) is None
 
 
+def test_poses_one_after_the_other_are_left_alone():
+    walk = replace(gaits.make(seconds=3), contacts=None)
+    held = [30 * (i // 30) for i in range(len(walk))]
+    poses = replace(walk, rotations=walk.rotations[held], root_positions=walk.root_positions[held])
+    assert doubt_first(with_tpose(poses), said=False) is None
+
+
 def test_it_is_told_where_files_are_read(tmp_path):
     write_bvh(with_tpose(gaits.make(seconds=1)), tmp_path / "a.bvh")
     write_gltf(with_tpose(gaits.make(seconds=1)), tmp_path / "a.glb")

@@ -31,6 +31,8 @@ def doubt_first(motion: Motion, said: bool) -> str | None:
     first, largest = float(steps[held]), float(steps[held + _AFTER : held + _NEXT].max())
     if first <= _FAR * extent or first < _TIMES * largest:
         return None
+    if largest <= _STILL * extent:  # poses, one after the other
+        return None
     times = (
         f"{min(first / max(largest, 1e-9), 99):.0f} times as far as between any frames soon after"
     )
