@@ -7,10 +7,7 @@ from torch import Tensor
 from ..motion import Motion
 
 _HELD = 120  # frames for which it may be held
-_AFTER, _NEXT = (
-    4,
-    13,
-)  # frames after it with whose steps its own is compared; filters blur the first
+_AFTER, _NEXT = 4, 13  # of the frames after it, those whose steps count: filters blur the first
 _TIMES = 4.0  # as far as the largest of these; of 1457 real clips none does
 _FAR = 0.03  # of the body's extent, mean of all joints
 _STILL = 1e-4  # of the same: so still is no living body
@@ -29,13 +26,10 @@ def doubt_first(motion: Motion, said: bool) -> str | None:
     if len(steps) < held + _NEXT - 1 or held >= _HELD or (said and held == 0):
         return None
     first, largest = float(steps[held]), float(steps[held + _AFTER : held + _NEXT].max())
-    if first <= _FAR * extent or first < _TIMES * largest:
+    poses = largest <= _STILL * extent  # one after the other, as keyed by hand
+    if poses or first <= _FAR * extent or first < _TIMES * largest:
         return None
-    if largest <= _STILL * extent:  # poses, one after the other
-        return None
-    times = (
-        f"{min(first / max(largest, 1e-9), 99):.0f} times as far as between any frames soon after"
-    )
+    times = f"{min(first / largest, 99):.0f} times as far as between any frames soon after"
     if held:
         return (
             f"frames 0 to {held} are one pose, and from there the body's joints jump {times}: if the body "
