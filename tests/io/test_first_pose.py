@@ -10,6 +10,8 @@ import torch
 
 from motionlab import Motion, Skeleton, read_bvh, read_gltf, write_bvh, write_gltf
 from motionlab.datasets import gaits
+from motionlab.datasets.registry import sources
+from motionlab.io.bvh import parse_bvh
 from motionlab.io.first_pose import doubt_first
 
 
@@ -60,6 +62,18 @@ def test_poses_one_after_the_other_are_left_alone():
     held = [30 * (i // 30) for i in range(len(walk))]
     poses = replace(walk, rotations=walk.rotations[held], root_positions=walk.root_positions[held])
     assert doubt_first(with_tpose(poses), said=False) is None
+
+
+def test_raw_files_of_cmu_s_begin_so_and_cleaned_clips_do_not(real_clips):
+    for source in ("cmu", "aclstm-cmu"):
+        said = []
+        for path, data in real_clips[source].items():
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                motion = parse_bvh(data, path, units=sources()[source].units)
+            said.append(doubt_first(motion, said=False) is not None)
+            assert doubt_first(motion[10:], said=False) is None, path
+        assert sum(said) >= len(said) - 1 > 0, source  # CMU's 02_01 has none
 
 
 def test_it_is_told_where_files_are_read(tmp_path):

@@ -8,7 +8,7 @@ from ..motion import Motion
 
 _HELD = 120  # frames for which it may be held
 _AFTER, _NEXT = 4, 13  # of the frames after it, those whose steps count: filters blur the first
-_TIMES = 4.0  # as far as the largest of these; of 1457 real clips none does
+_TIMES = 4.0  # as far as the largest of these; people never move so
 _FAR = 0.03  # of the body's extent, mean of all joints
 _STILL = 1e-4  # of the same: so still is no living body
 
