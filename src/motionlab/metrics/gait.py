@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from ..feet.contacts import foot_points, velocities
-from ..roles import SIDES
+from ..feet.strides import stances, strikes
 from ..skeleton import Skeleton
 from .checks import check_contacts, check_positions, check_positive, check_rate, check_skeleton
 
@@ -105,10 +105,11 @@ def cadence(contacts: Tensor, fps: float, shortest: float = 0.07) -> Tensor:
     MetricError : wrong shape, not bool, a bad rate.
     """
     contacts, fps = check_contacts(contacts), check_rate(fps)
+    check_positive(shortest, "shortest")
     result = []
     for clip in contacts.reshape(-1, *contacts.shape[-2:]).numpy(force=True):
-        strikes = [start for foot in _stances(clip, fps, shortest) for start, _ in foot if start]
-        steps, frames = len(strikes) - 1, np.ptp(strikes) if strikes else 0
+        down = [frame for frame, _ in strikes(clip, fps, shortest)]
+        steps, frames = len(down) - 1, np.ptp(down) if down else 0
         result.append(60 * fps * steps / frames if frames else np.nan)
     return torch.tensor(result, device=contacts.device).reshape(contacts.shape[:-2])
 
@@ -139,6 +140,7 @@ def step_length(
     """
     positions, fps = check_skeleton(positions, skeleton), check_rate(fps)
     contacts = check_contacts(contacts, positions)
+    check_positive(shortest, "shortest")
     ground = positions[..., foot_points(skeleton), :][..., [0, 2]].double()
     feet = ground.unflatten(-2, (2, 2)).mean(-2)  # heel and toe of each foot
     result = []
@@ -148,31 +150,9 @@ def step_length(
         strict=True,
     ):
         steps = []
-        for foot, stances in enumerate(_stances(labels, fps, shortest)):
-            whole = [(a, b) for a, b in stances if a > 0 and b < len(clip)]
+        for foot, spans in enumerate(stances(labels, fps, shortest)):
+            whole = [(a, b) for a, b in spans if a > 0 and b < len(clip)]
             places = np.array([clip[a:b, foot].mean(0) for a, b in whole]).reshape(-1, 2)
             steps.extend(np.linalg.norm(np.diff(places, axis=0), axis=1) / 2)
         result.append(np.mean(steps) if steps else np.nan)
     return torch.tensor(result, device=positions.device).to(positions).reshape(feet.shape[:-3])
-
-
-def _stances(labels: np.ndarray, fps: float, shortest: float) -> list[list[tuple[int, int]]]:
-    """For each foot the spans of frames (start, stop) in which it is down, flicker removed.
-
-    labels : bool (frames, 4) or (frames, 2).
-    """
-    shortest = check_positive(shortest, "shortest") * fps
-    feet = []
-    for side in range(len(SIDES)):
-        down = labels.reshape(len(labels), len(SIDES), -1)[:, side].any(-1)
-        edges = np.flatnonzero(np.diff(down.astype(int), prepend=0, append=0)).reshape(-1, 2)
-        spans: list[tuple[int, int]] = []
-        for start, stop in edges.tolist():
-            if spans and start - spans[-1][1] < shortest:
-                spans[-1] = (spans[-1][0], stop)
-            else:
-                spans.append((start, stop))
-        # A span at either end of the motion may be the visible part of a long one.
-        last = len(down)
-        feet.append([(a, b) for a, b in spans if b - a >= shortest or a == 0 or b == last])
-    return feet
