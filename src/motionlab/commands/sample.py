@@ -177,6 +177,11 @@ def locked(motion: Motion) -> Motion:
 
 def check_generates(model: nn.Module, name: str) -> None:
     """Raise MotionLabError for weights that make no motion of their own."""
+    if hasattr(model, "layout"):
+        raise MotionLabError(
+            f"{name}: is a PFNN, which makes no motion of its own; it is led along a path: "
+            f"motionlab.models.pfnn.follow(motionlab.load({name!r}), [points], speed=1.2)."
+        )
     if not hasattr(model, "generate"):
         raise MotionLabError(
             f"{name}: is a {type(model).__name__.lower()}, which corrects motion and makes none; name "

@@ -23,7 +23,7 @@ class Train:
 
     model: Positional[str]
     """lstm-gmm, lstm-gmm-contacts, lstm-gmm-permissive (with contacts, on the clips that are free
-    for commercial use); refiner, refiner-contacts of the first two; or METHOD-STYLE, such as
+    for commercial use); pfnn; refiner, refiner-contacts of the first two; or METHOD-STYLE, such as
     aclstm-indian: one of the methods aclstm, lstm-3lr, scheduled, erd, seq2seq on one of the styles
     martial, indian, hybrid, walking."""
     preset: Literal["smoke", "table", "ship", "paper"] = "table"
@@ -76,7 +76,8 @@ class Train:
             ) from error
         chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
-        style = "locomotion" if "lstm-gmm" in self.model else self.model.rpartition("-")[2]
+        walks = self.model == "pfnn" or "lstm-gmm" in self.model
+        style = "locomotion" if walks else self.model.rpartition("-")[2]
         free = self.data is None and self.model.endswith("-permissive")
         data = Prepared.find(self.data or style, free, **self.folder.reading())
         if self.model == "lstm-gmm":
@@ -94,7 +95,7 @@ class Train:
         print(f"{out}: {curve[-1]['update']} updates; best of validation {best['val']:.3f} at "
               f"update {best['update']}; weights in {preset.weights}"
               + "".join(f"; {key} {value:g}" for key, value in sampling.items())
-              + f"; starts and licence in {Path(preset.weights).with_suffix('.md')}")  # fmt: skip
+              + f"; their card is {Path(preset.weights).with_suffix('.md')}")  # fmt: skip
 
     def _play(self, preset: GamePreset, out: Path) -> None:
         from ..training import Prepared

@@ -19,8 +19,9 @@ from torch import Tensor, nn
 
 from ..errors import MotionLabError, TrainingError
 from ..models import AcLstm, Erd, LstmGmm, Refiner, Seq2Seq
+from ..models.pfnn import Pfnn
 
-_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner)}
+_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn)}
 _STARTS = "starts."
 
 

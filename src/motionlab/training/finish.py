@@ -16,6 +16,7 @@ from .. import metrics
 from ..errors import TrainingError
 from ..models import LstmGmm
 from ..models.familiar import bounds
+from ..models.pfnn import Pfnn
 from .checkpoints import load_weights, save_weights, write_whole
 from .licence import in_words
 from .prepared import Prepared
@@ -30,13 +31,17 @@ def finish(path: str | os.PathLike, data: Prepared) -> dict[str, float]:
     """Add to a training's weights what `motionlab.load` gives with them; what it samples with.
 
     Starts are moments of validation clips. A mixture also gets the temperature at which its motion
-    is as lively as those clips, and the bounds beyond which `observe` warns. What the weights are is told in a card beside them.
+    is as lively as those clips, and the bounds beyond which `observe` warns. A PFNN begins by itself.
+    What the weights are is told in a card beside them.
 
     Raises
     ------
     TrainingError : the file is missing, damaged, or can't be written.
     """
     model, about = load_weights(path)
+    if isinstance(model, Pfnn):
+        write_card(path)
+        return {}
     model.eval()
     before, names = before_starts(data, model.fps)
     sampling = {}

@@ -176,16 +176,22 @@ def build(data: Prepared, preset: Preset, start: Path | None = None) -> nn.Modul
 
     Raises
     ------
-    TrainingError : the weights are for another encoding than the data's, or a refiner's.
+    TrainingError : the weights are of another model, or for other features than the data's.
     """
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(preset.seed)
+        anew = preset.model(data)
     if start is None:
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(preset.seed)
-            return preset.model(data)
+        return anew
     model, _ = load_weights(start)
     if isinstance(model, Refiner):
         raise TrainingError(f"{start}: is a refiner, which is trained by a game, not to predict.")
-    if model.encoding.config() != data.encoding.config():
+    if type(model) is not type(anew):
+        kinds = type(model).__name__, type(anew).__name__
+        raise TrainingError(
+            f"{start}: holds the weights of a {kinds[0]}; this trains a {kinds[1]}."
+        )
+    if any(model.config().get(what) != anew.config().get(what) for what in ("encoding", "layout")):
         raise TrainingError(
             f"{start}: these weights are for features of another kind than the data."
         )

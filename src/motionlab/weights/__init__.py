@@ -73,7 +73,7 @@ def load(name_or_path: str | os.PathLike) -> nn.Module:
     model.about, model.hash = about, hashlib.sha256(path.read_bytes()).hexdigest()
     model.start_names = tuple(about.get("starts", ()))
     model.sampling = about.get("sampling", {})
-    if model.starts is None:
+    if model.starts is None and hasattr(model, "observe"):  # a PFNN begins by itself
         model.starts = model.observe(model.normalizer.mean[None])
         model.start_names = ("mean frame",)
     if "familiar" in about:  # not before: a mean frame is no motion

@@ -41,12 +41,6 @@ def test_many_paths_are_as_each_alone():
         assert torch.allclose(alone.rotations, motion.rotations, atol=1e-4)
 
 
-def test_a_network_in_training_is_so_afterwards():
-    network = steady(layout()).train()
-    follow(network, [torch.tensor([[0.0, 0.0], [0.0, 1.0]])], 1.0)
-    assert network.training
-
-
 @pytest.mark.parametrize(
     "wrong, said",
     [

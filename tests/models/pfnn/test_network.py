@@ -80,10 +80,32 @@ def test_inputs_and_outputs_are_in_raw_units():
     assert torch.allclose(scaled(2 + 3 * x, phase), plain(x, phase) / 2 - 1, atol=1e-5)
 
 
-def test_inputs_are_dropped_in_training_only():
-    model, x, phase = network(drop=0.5), torch.randn(1, size(LAYOUT.seen)), torch.zeros(1)
-    assert not torch.equal(model.train()(x, phase), model(x, phase))
-    assert torch.equal(model.eval()(x, phase), model(x, phase))
+def test_lots_decide_what_is_dropped():
+    """A layer's input is left out below the share, and the others are louder by as much."""
+    model, x, phase = network(drop=0.25), torch.randn(2, size(LAYOUT.seen)), torch.zeros(2)
+    lots = torch.ones(2, size(LAYOUT.seen) + 2 * model.width)
+    lots[:, :30] = 0.2
+    quieter = x.clone()
+    quieter[:, :30] = 0
+    for layer in model.layers:  # undo the loudness
+        layer.weight.data *= 0.75
+    dropped = model.answer(x, phase, lots)
+    for layer in model.layers:
+        layer.weight.data /= 0.75
+    assert torch.allclose(dropped, model.answer(quieter, phase), atol=1e-5)
+
+
+def test_the_loss_is_the_error_and_in_training_the_size_of_weights():
+    model = network(sparsity=2.0)
+    row = torch.randn(3, 1, 1 + size(LAYOUT.seen) + size(LAYOUT.said))
+    phase, seen, said = row[:, 0].split([1, size(LAYOUT.seen), size(LAYOUT.said)], dim=-1)
+    error = (model(seen, phase[:, 0]) - said).square().mean()
+    assert torch.allclose(model.loss(row), error)
+    weights = sum(layer.weight.abs().mean() for layer in model.layers) / 3
+    lots = torch.ones(3, 1, row.shape[-1] + 2 * model.width)
+    assert torch.allclose(model.loss(row, lots), error + 2 * weights)
+    lots[..., 0] = lots[..., -model.width - size(LAYOUT.said) - model.width : -2 * model.width] = 0
+    assert torch.allclose(model.loss(row, lots), error + 2 * weights)  # nobody drops what is said
 
 
 def test_what_config_says_builds_it_again():
@@ -91,7 +113,7 @@ def test_what_config_says_builds_it_again():
     again = Pfnn.from_config(json.loads(json.dumps(model.config())))
     again.load_state_dict(model.state_dict())
     x = torch.randn(2, size(LAYOUT.seen))
-    assert torch.equal(again.eval()(x, torch.ones(2)), model.eval()(x, torch.ones(2)))
+    assert torch.equal(again(x, torch.ones(2)), model(x, torch.ones(2)))
     assert again.config() == model.config()
 
 
@@ -103,7 +125,17 @@ def test_parts_come_back_from_rows():
     assert layout.points == 12 and layout.said["places"] == (2, 6)
 
 
-@pytest.mark.parametrize("wrong", [{"width": 0}, {"width": 1.5}, {"drop": 1.0}, {"drop": -0.1}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"width": 0},
+        {"width": 1.5},
+        {"drop": 1.0},
+        {"drop": -0.1},
+        {"sparsity": -1.0},
+        {"sparsity": math.nan},
+    ],
+)
 def test_settings_that_make_no_sense(wrong):
     with pytest.raises(ModelError, match=f"{next(iter(wrong))} is"):
         network(**wrong)

@@ -63,8 +63,7 @@ def follow(
     ahead = torch.arange(1, its.reach) * (speeds[:, None] / its.fps)
     along = torch.zeros_like(speeds)
     start, facing = routes.at(along[:, None])
-    walk, frames, learning = begin(network, start[:, 0], facing[:, 0]), [], network.training
-    network.eval()
+    walk, frames = begin(network, start[:, 0], facing[:, 0]), []
     for _ in range(max(counts)):
         along = routes.nearest(walk.root[0], along)
         places, directions = routes.at(along[:, None] + ahead)
@@ -75,7 +74,6 @@ def follow(
         )
         frame, walk = step(network, walk, gaits)
         frames.append(frame)
-    network.train(learning)
     shown = Frame(*(torch.stack(parts, dim=1) for parts in zip(*frames, strict=True)))
     return [
         _motion(network, Frame(*(part[row, :count] for part in shown)))

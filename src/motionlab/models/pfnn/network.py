@@ -12,7 +12,7 @@ from typing import Self
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import dropout, elu
+from torch.nn.functional import elu
 
 from ...encodings import Normalizer
 from ...encodings.base import skeleton_config
@@ -93,6 +93,7 @@ class Pfnn(nn.Module):
     layout : what inputs and outputs mean.
     width : units of the two hidden layers, 512 in the paper.
     drop : share of inputs of each layer that are dropped in training, 0.3 in the paper.
+    sparsity : what the mean size of weights costs in training, 0.01 in the paper.
     seen, said : Normalizers of inputs and outputs; None: to be filled by `load_state_dict`.
 
     Raises
@@ -105,6 +106,7 @@ class Pfnn(nn.Module):
         layout: Layout,
         width: int = 512,
         drop: float = 0.3,
+        sparsity: float = 0.01,
         seen: Normalizer | None = None,
         said: Normalizer | None = None,
     ) -> None:
@@ -113,7 +115,9 @@ class Pfnn(nn.Module):
             raise ModelError(f"Pfnn: width is {width!r}; it must be a whole number from 1.")
         if not 0 <= drop < 1:
             raise ModelError(f"Pfnn: drop is {drop!r}; it must be a share, from 0 to below 1.")
-        self.layout, self.width, self.drop = layout, width, drop
+        if not 0 <= sparsity < math.inf:
+            raise ModelError(f"Pfnn: sparsity is {sparsity!r}; it must be a number from 0.")
+        self.layout, self.width, self.drop, self.sparsity = layout, width, drop, sparsity
         self.seen, self.said = _normalizer(layout.seen, seen), _normalizer(layout.said, said)
         sizes = len(self.seen.mean), width, width, len(self.said.mean)
         pairs = zip(sizes[:-1], sizes[1:], strict=True)
@@ -126,13 +130,44 @@ class Pfnn(nn.Module):
         """
         return self.said.inverse(self.answer(self.seen(seen), phase))
 
-    def answer(self, x: Tensor, phase: Tensor) -> Tensor:
-        """The same in normalised units."""
+    def answer(self, x: Tensor, phase: Tensor, lots: Tensor | None = None) -> Tensor:
+        """The same in normalised units.
+
+        lots : (batch, seen + 2 width) from 0 to 1, one for each input of a layer; those below `drop`
+            are dropped, and what is left is louder by as much. None: nothing is dropped.
+        """
         some = shares(phase)
-        for number, layer in enumerate(self.layers):
+        sizes = [layer.weight.shape[-1] for layer in self.layers]
+        drawn = [None] * len(sizes) if lots is None else lots.split(sizes, dim=-1)
+        for number, (layer, lot) in enumerate(zip(self.layers, drawn, strict=True)):
             x = elu(x) if number else x
-            x = layer(dropout(x, self.drop, self.training), some)
+            x = x if lot is None else x * (lot >= self.drop) / (1 - self.drop)
+            x = layer(x, some)
         return x
+
+    def loss(self, rows: Tensor, lots: Tensor | None = None) -> Tensor:
+        """Mean squared error of what the network says, in normalised units.
+
+        In training, with lots, inputs are dropped and the mean size of the weights is added,
+        `sparsity` times.
+
+        Parameters
+        ----------
+        rows : (batch, 1, 1 + seen + said), windows of one row as `examples` gives them.
+        lots : (batch, 1, 1 + seen + said + 2 width) from 0 to 1, for each number of a row, of which
+            those that are seen count, and for each hidden unit.
+        """
+        sizes = [1, len(self.seen.mean), len(self.said.mean)]
+        phase, seen, said = rows[:, 0].split(sizes, dim=-1)
+        if lots is not None:
+            _, first, _, others = lots[:, 0].split([*sizes, 2 * self.width], dim=-1)
+            lots = torch.cat([first, others], dim=-1)
+        found = self.answer(self.seen(seen), phase[:, 0], lots)
+        error = (found - self.said(said)).square().mean()
+        if lots is None:
+            return error
+        weights = torch.stack([layer.weight.abs().mean() for layer in self.layers]).mean()
+        return error + self.sparsity * weights
 
     def config(self) -> dict:
         """What `from_config` needs to build an untrained copy; fit for JSON."""
@@ -141,14 +176,15 @@ class Pfnn(nn.Module):
             name: getattr(its, name) for name in ("fps", "reach", "stride", "gaits", "grounds")
         }
         body = skeleton_config(its.skeleton)
-        return {"layout": {"skeleton": body, **sizes}, "width": self.width, "drop": self.drop}
+        numbers = {name: getattr(self, name) for name in ("width", "drop", "sparsity")}
+        return {"layout": {"skeleton": body, **sizes}, **numbers}
 
     @classmethod
     def from_config(cls, config: dict) -> Self:
         """A network of the right shapes, to be filled by `load_state_dict`."""
         skeleton = Skeleton(**config["layout"]["skeleton"])
         layout = Layout(**{**config["layout"], "skeleton": skeleton})
-        return cls(layout, config["width"], config["drop"])
+        return cls(layout, config["width"], config["drop"], config["sparsity"])
 
 
 def _normalizer(parts: dict[str, tuple[int, ...]], given: Normalizer | None) -> Normalizer:

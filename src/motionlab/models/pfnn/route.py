@@ -52,17 +52,22 @@ class Routes:
         some = ((along / _SPACING).round().long()[:, None] + within).clamp(
             0, self.points.shape[1] - 2
         )
-        gaps = places[:, None, [0, 2]] - self.points[self._rows, some]
+        gaps = flat(places)[:, None] - self.points[self._rows, some]
         best = some.gather(1, gaps.square().sum(-1).argmin(1, keepdim=True))  # (lines, 1)
         here, way = self.at(best * _SPACING)
         rest = ((places - here[:, 0]) * way[:, 0]).sum(-1).clamp(-_SPACING, _SPACING)
         return (best[:, 0] * _SPACING + rest).clamp(min=0)
 
 
-def upright(flat: Tensor) -> Tensor:
-    """Places (..., 2), x and z, as (..., 3) on the ground."""
-    x, z = flat.unbind(-1)
+def upright(pairs: Tensor) -> Tensor:
+    """Places (..., 3) on the ground of x and z (..., 2)."""
+    x, z = pairs.unbind(-1)
     return torch.stack([x, torch.zeros_like(x), z], dim=-1)
+
+
+def flat(places: Tensor) -> Tensor:
+    """x and z (..., 2) of places (..., 3)."""
+    return places[..., [0, 2]]
 
 
 def _checked(line: Tensor) -> Tensor:

@@ -17,7 +17,7 @@ from ...encodings.path import turned
 from ...kinematics import yaw_matrix
 from .layout import join, split
 from .network import Pfnn
-from .route import upright
+from .route import flat, upright
 
 _BLEND = 0.5  # share of the predicted joints; the rest are the old ones, moved by their velocities
 
@@ -103,13 +103,12 @@ def seen(network: Pfnn, walk: Walk, gaits: Tensor) -> Tensor:
     its = network.layout
     place, yaw = walk.root
     some = slice(None, None, its.stride)
-    flat = lambda points: points[..., [0, 2]].mT  # (batch, N, 3) to x and z, (batch, 2, N)
     places = turned(walk.places[:, some] - place[:, None], -yaw[:, None])
     last = slice(its.reach - 1, its.reach)
     before, yaw_before = walk.places[:, last], yaw_of(walk.directions[:, last])
     values = {
-        "places": flat(places),
-        "directions": flat(turned(walk.directions[:, some], -yaw[:, None])),
+        "places": flat(places).mT,
+        "directions": flat(turned(walk.directions[:, some], -yaw[:, None])).mT,
         "gaits": gaits[..., None].expand(-1, -1, its.points),
         "joints": turned(walk.joints - before, -yaw_before),
         "velocities": turned(walk.velocities, -yaw_before),
