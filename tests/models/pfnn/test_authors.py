@@ -11,6 +11,7 @@ from motionlab.errors import DataError
 from motionlab.models.pfnn import authors, follow, load_authors
 from motionlab.models.pfnn.layout import split
 from motionlab.models.pfnn.network import shares
+from motionlab.models.pfnn.walk import begin, lead, step
 
 
 @pytest.fixture(scope="session")
@@ -166,6 +167,27 @@ def test_its_feet_rest_where_it_says(walks):
     motion = walks["2 m to the left"]
     said = contacts.agreement(motion.contacts, contacts.label(motion))["all"]
     assert said["precision"] > 0.95 and said["recall"] > 0.6
+
+
+def test_its_right_foot_comes_down_at_phase_0(network):
+    """And its left one half a turn later: the phase is that of `feet.strides`."""
+    walk = begin(network, torch.zeros(1, 3), torch.tensor([[0.0, 0.0, 1.0]]))
+    gaits, down, before = torch.eye(6)[[1]], {"left": [], "right": []}, None
+    onward = torch.tensor([[[0.0, 0.0, 1.0]]]).expand(1, 59, 3)
+    ahead = torch.arange(1, 60)[:, None] * 0.018 * onward
+    for frame in range(240):
+        place, _ = walk.root
+        walk = lead(walk, place + ahead, onward)
+        now = float(walk.phase)
+        shown, walk = step(network, walk, gaits)
+        toes = (shown.contacts[0, [1, 3]] > 0.5).tolist()
+        for side, was, is_ in zip(down, before or toes, toes, strict=True):
+            if is_ and not was and frame > 60:
+                down[side].append(now)
+        before = toes
+    assert all(len(phases) >= 2 for phases in down.values())
+    assert all(abs(math.sin(phase / 2)) < 0.1 for phase in down["right"])  # near 0, or 2π
+    assert all(abs(math.cos(phase / 2)) < 0.1 for phase in down["left"])  # near π
 
 
 def test_it_sits_at_no_phase_alone(network):

@@ -29,8 +29,8 @@ def test_many_paths_are_as_each_alone():
     for parameter in network.parameters():
         torch.nn.init.normal_(parameter, std=0.02)
     lines = [
-        torch.tensor([[0.0, 0.0], [0.0, 2.0]]),
-        torch.tensor([[0.0, 0.0], [1.0, 1.0], [1.0, 4.0]]),
+        torch.tensor([[0.0, 0.0], [0.0, 0.8]]),
+        torch.tensor([[0.0, 0.0], [0.5, 0.5], [0.5, 1.0]]),
     ]
     speeds = [1.5, 1.1]
     together = follow(network, lines, speeds)
@@ -39,6 +39,12 @@ def test_many_paths_are_as_each_alone():
         (alone,) = follow(network, [line], speed)
         assert torch.allclose(alone.root_positions, motion.root_positions, atol=1e-5)
         assert torch.allclose(alone.rotations, motion.rotations, atol=1e-4)
+
+
+@pytest.mark.parametrize("paths", [[], torch.tensor([[0.0, 0.0], [0.0, 1.0]])])
+def test_paths_are_a_list_of_some(paths):
+    with pytest.raises(ModelError, match=r"must be a list, of one path or more: \[points\]"):
+        follow(steady(layout()), paths, 1.0)
 
 
 @pytest.mark.parametrize(

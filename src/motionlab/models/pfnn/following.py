@@ -7,13 +7,14 @@ from collections.abc import Sequence
 
 import torch
 from torch import Tensor
+from tqdm import tqdm
 
 from ...errors import ModelError
 from ...motion import Motion
 from .layout import GAITS
 from .network import Pfnn
 from .route import Routes
-from .walk import Frame, begin, step
+from .walk import Frame, begin, lead, step
 
 _DOWN = 0.5  # a foot for which the network says more is in contact
 _JOG = 2.0  # metres a second from which on one does not walk
@@ -51,6 +52,8 @@ def follow(
     ------
     ModelError : a path that is none, a speed or time not above 0, an unknown gait.
     """
+    if isinstance(paths, Tensor) or not len(paths):
+        raise ModelError("follow: paths must be a list, of one path or more: [points].")
     its, speeds = network.layout, _speeds(speed, len(paths))
     if seconds is not None and not 0 < seconds < math.inf:
         raise ModelError(f"follow: seconds is {seconds!r}; it must be a number above 0.")
@@ -64,14 +67,9 @@ def follow(
     along = torch.zeros_like(speeds)
     start, facing = routes.at(along[:, None])
     walk, frames = begin(network, start[:, 0], facing[:, 0]), []
-    for _ in range(max(counts)):
+    for _ in tqdm(range(max(counts)), "walking", unit="frame", leave=False, delay=2):
         along = routes.nearest(walk.root[0], along)
-        places, directions = routes.at(along[:, None] + ahead)
-        upto = slice(None, its.reach + 1)
-        walk = walk._replace(
-            places=torch.cat([walk.places[:, upto], places], dim=1),
-            directions=torch.cat([walk.directions[:, upto], directions], dim=1),
-        )
+        walk = lead(walk, *routes.at(along[:, None] + ahead))
         frame, walk = step(network, walk, gaits)
         frames.append(frame)
     shown = Frame(*(torch.stack(parts, dim=1) for parts in zip(*frames, strict=True)))

@@ -68,6 +68,15 @@ def begin(network: Pfnn, places: Tensor, directions: Tensor) -> Walk:
     )  # fmt: skip
 
 
+def lead(walk: Walk, places: Tensor, directions: Tensor) -> Walk:
+    """The same with another trajectory to come: (batch, reach - 1, 3) each, the next frame first."""
+    upto = slice(None, walk.places.shape[1] - places.shape[1])
+    return walk._replace(
+        places=torch.cat([walk.places[:, upto], places], dim=1),
+        directions=torch.cat([walk.directions[:, upto], directions], dim=1),
+    )
+
+
 def step(network: Pfnn, walk: Walk, gaits: Tensor) -> tuple[Frame, Walk]:
     """One frame more.
 
