@@ -33,7 +33,8 @@ def follow(
 
     In each frame the trajectory to come is replaced by the points of the path that one would reach
     at this speed from the nearest place on it; the network does the rest. It needs no search and
-    never looks back: what it strays, it strays.
+    never looks back: what it strays, it strays. Nor need it be as fast as the points: on a straight
+    line the authors' network makes 1.0 m/s of 1.0, 1.1 of 1.2, 1.3 of 1.5, and in its jog 2.0 of 3.0.
 
     Parameters
     ----------

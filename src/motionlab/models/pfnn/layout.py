@@ -26,6 +26,22 @@ GAITS = ("stand", "walk", "jog", "crouch", "jump", "unused")
 class Layout:
     """Sizes and order of inputs and outputs. Lengths are metres, velocities metres a frame.
 
+    What is seen, in the present root frame unless said otherwise:
+
+    * places (2, N), x and z, and directions (2, N) of the trajectory; gaits (gaits, N);
+    * joints (J, 3) and velocities (J, 3) of the frame before, in the root frame of that one;
+    * grounds (grounds, N), heights over the root's.
+
+    What is said:
+
+    * step (2,) of the root to the next frame, x and z; turn (1,) in radians, about -y; phase (1,), a
+      step in parts of a cycle; contacts (4,) of left heel, left toe, right heel, right toe;
+    * places (2, N / 2) and directions (2, N / 2) from the next frame on, in that one's root frame;
+    * joints (J, 3), velocities (J, 3) and rotations (J, 3) of the present frame: half a rotation
+      vector (the logarithm of a quaternion) from the root to the joint.
+
+    Velocities are those in the step to a frame; in the authors' data, in the step from it.
+
     Parameters
     ----------
     skeleton : the body; J is the number of its joints.
@@ -33,17 +49,11 @@ class Layout:
     reach : frames of trajectory behind the present one, and as many from the present one on.
     stride : of them every so manieth is seen, N points in all.
     gaits : weights of gaits at each point (those of `GAITS`), 0 for a network that is told none.
-    grounds : heights of the ground at each point, right, below and left of it; 0: the ground is flat.
+    grounds : heights of the ground at each point, right, below and left of it; 0: it is flat.
 
-    The seen, all but the last two in the present root frame:
-        places (2, N) x and z, directions (2, N), gaits (gaits, N); joints (J, 3) and velocities
-        (J, 3) of the frame before in the root frame of that frame; grounds (grounds, N).
-    The said:
-        step (2,) of the root to the next frame, x and z; turn (1,) in radians, about -y; phase (1,),
-        a step in parts of a cycle; contacts (4,) of left heel, left toe, right heel, right toe;
-        places (2, N / 2) and directions (2, N / 2) from the next frame on, in that one's root
-        frame; joints (J, 3), velocities (J, 3) and rotations (J, 3) of the present one, in its
-        root frame: half a rotation vector (the logarithm of a quaternion) from there to the joint.
+    Raises
+    ------
+    ModelError : a stride that does not divide the reach.
     """
 
     skeleton: Skeleton
@@ -93,13 +103,13 @@ def size(parts: dict[str, tuple[int, ...]]) -> int:
 
 
 def join(parts: dict[str, tuple[int, ...]], values: dict[str, Tensor]) -> Tensor:
-    """Rows (..., width) of the values of all parts, each (..., *shape)."""
+    """Rows (..., size) of the values of all parts, each (...) and its shape."""
     flat = [values[name].flatten(-len(shape)) for name, shape in parts.items()]
     return torch.cat(flat, dim=-1)
 
 
 def split(parts: dict[str, tuple[int, ...]], rows: Tensor) -> dict[str, Tensor]:
-    """Each part (..., *shape) of rows (..., width)."""
+    """Each part, (...) and its shape, of rows (..., size)."""
     pieces = rows.split([math.prod(shape) for shape in parts.values()], dim=-1)
     named = zip(parts.items(), pieces, strict=True)
     return {name: piece.unflatten(-1, shape) for (name, shape), piece in named}
