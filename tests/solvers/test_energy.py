@@ -47,6 +47,7 @@ def wishes(network, window, piece):
         "turn": terms.turn(0.7),
         "step length": terms.step_length(0.9, body),
         "contact": terms.contact(body),
+        "resting": terms.resting(body, encoding.fps, slower=20.0),
         "places": terms.places(points, [0], seen),
         "channels": terms.channels(angles, encoding.slices["pose"]),
     }
@@ -80,7 +81,7 @@ def test_noise_is_a_gaussian(network, window):
 
 
 NAMES = ["prior", "noise", "path", "hand", "toe", "time", "ahead", "speed", "direction", "turn",
-         "step length", "contact", "places", "channels"]  # fmt: skip
+         "step length", "contact", "resting", "places", "channels"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -177,6 +178,14 @@ def test_contact_costs_what_slides_and_floats(clips):
     assert term(None, positions, contacts).item() == pytest.approx(3 / 2)
     positions[:, 5, body.role("left_toes"), 1] += 0.02
     assert term(None, positions, contacts).item() == pytest.approx(3 / 2 + 2)
+
+
+def test_what_is_slow_rests_and_what_is_fast_may(clips):
+    body, features = clips[0].skeleton, None
+    term = terms.resting(body, 30.0, slide=0.01, slower=0.45)
+    slow, fast = straight(0.06), straight(0.12)  # 0.3 and 0.6 m/s, four joints, six frames
+    assert term(features, slow, None).item() == pytest.approx(4 * 6 / 2)
+    assert term(features, fast, None).item() == 0
 
 
 def test_step_length_is_measured_where_a_toe_sets_down(clips):

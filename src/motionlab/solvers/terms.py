@@ -31,13 +31,14 @@ from .paths import Piece
 
 Term = Callable[[Tensor, Tensor, Tensor | None], Tensor]
 
-PATH = 0.02  # m; roots of people sway 3.1 cm aside of their mean way, and less than that is asked
-TIME = 0.10  # m along the path; people sway 2.7 cm to and fro, and change their pace by more
+PATH = 0.007  # m; people sway by four times that, so this is already a strict wish
+TIME = 0.1  # m along the path; people sway 2.7 cm to and fro, and change their pace by more
 AHEAD = 0.15  # m; half a second of a sideways sway of 0.2 m/s, and some
-SPEED = 0.10  # m/s of a window's mean speed
+SPEED = 0.1  # m/s of a window's mean speed
 FACING = 0.2  # rad; people face 0.19 off their way
 STEP = 0.03  # m
-SLIDE, HEIGHT = 0.01, 0.02  # m a frame, m: half of what sampled toes do; recorded ones do neither
+SLIDE, HEIGHT = 0.004, 0.008  # m a frame, m: a fifth of what sampled toes do; recorded do neither
+SLOW = 0.45  # m/s, of a foot in contact: the paper's
 ROOT, ANGLE = 0.02, 0.08  # m, rad: the weaker noise that denoising is tried on
 _GROUND = [0, 2]
 
@@ -151,6 +152,22 @@ def contact(skeleton: Skeleton, slide: float = SLIDE, height: float = HEIGHT) ->
         slides = feet[..., _GROUND].diff(dim=1) * held[..., None]
         above = (feet[:, 1:, :, 1] - low.to(feet)) * down[:, 1:]
         return _gaussian(slides.flatten(2), slide) + _gaussian(above, height)
+
+    return term
+
+
+def resting(skeleton: Skeleton, fps: float, slide: float = SLIDE, slower: float = SLOW) -> Term:
+    """What is slow rests: heels and toes that move by less than `slower` m/s do not move at all.
+
+    The network tells of toes only, and now and then a frame too late. This asks the feet themselves,
+    by the rule that labels recorded feet (section 4.3). Not the paper's.
+    """
+    feet = foot_points(skeleton)
+
+    def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
+        moves = positions[:, :, feet].diff(dim=1)  # (batch, frames, 4, 3)
+        slow = (moves.detach().norm(dim=-1) * fps < slower)[..., None]
+        return _gaussian((moves[..., _GROUND] * slow).flatten(2), slide)
 
     return term
 
