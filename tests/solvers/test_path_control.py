@@ -27,6 +27,7 @@ def walker():
 def one_try(monkeypatch):
     """So small a network is always astray."""
     monkeypatch.setattr(path_control, "RETRIES", 0)
+    monkeypatch.setattr(path_control, "LONGER", 0)
 
 
 def calm(seed=0):
@@ -118,6 +119,18 @@ def test_who_is_astray_begins_again_so_often_and_no_more(walker, monkeypatch):
     )
     assert way.retries >= 2 and way.retries % path_control.RETRIES == 0
     assert way.features.isfinite().all()
+
+
+@pytest.mark.parametrize(("rough", "more"), [(0.0, True), (10.0, False)])
+def test_who_is_not_near_goes_on_searching(walker, before, monkeypatch, rough, more):
+    monkeypatch.setattr(path_control, "ROUGH", rough)
+    table = STRAIGHT.timetable(1.2, 4.0, 30.0)
+    looked = []
+    for longer in (0, 1):
+        monkeypatch.setattr(path_control, "LONGER", longer)
+        (way,) = follow(walker, [STRAIGHT], before[[1]], [table], chance=calm(), **QUICK)
+        looked.append(way.evaluations / len(way.features))
+    assert (looked[1] > looked[0]) == more
 
 
 def test_interrupted_it_gives_what_it_has(walker):

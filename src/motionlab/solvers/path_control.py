@@ -4,7 +4,7 @@ Window after window of 34 frames, 17 of which are solved again with the next: th
 window do not know yet what comes. In each,
 
 1. `guided` sampling draws a few ways to go on, and the least unlikely is the first guess;
-2. `window.solve` descends from there;
+2. `window.solve` descends from there, and goes on where that has not led near the path (`LONGER`);
 3. who fell off his path, or his feet, begins again from other samples (`RETRIES` times);
 4. the first 17 frames stand fast, and the network's state goes on exactly behind them.
 
@@ -31,8 +31,9 @@ from .paths import Curves, Path
 from .window import METHODS, Solved, solve
 
 WINDOW, OVERLAP = 34, 17  # frames, the paper's
-CANDIDATES, RETRIES = 4, 2
-STEPS = 60
+CANDIDATES, STEPS = 4, 40
+LONGER, ROUGH = 2, 0.012  # times; m, root mean square from the path in a window
+RETRIES = 2
 ASTRAY = 0.10  # m, root mean square from the path in a window: that is no following
 STRANGE = 20.0  # deviations of the data from their mean: no body is there
 UNLIKELY = 60.0  # nats a frame less than samples have: the body comes apart
@@ -194,14 +195,19 @@ class _Job:
         """Solve a window, and let its first frames stand fast."""
         arcs = self._due()
         rows = torch.arange(len(self.which))
-        solved = self._solve(arcs, rows)
+        solved = self._solve(arcs, rows, *self._guess(arcs, rows))
+        for _ in range(LONGER if self.method in ("adam", "lbfgs") else 0):
+            rough = rows[self._off(arcs, solved) > ROUGH]
+            if len(rough):
+                further = self._solve(arcs, rough, solved.s[rough], solved.d[rough])
+                solved = _better(solved, further, rough)
         for _ in range(RETRIES):
             lost = rows[self._astray(arcs, solved)]
-            if not len(lost):
-                break
+            if len(lost):
+                again = self._solve(arcs, lost, *self._guess(arcs, lost))
+                solved = _better(solved, again, lost)
             for number in self.which[lost].tolist():
                 self.ways[number].retries += 1
-            solved = _better(solved, self._solve(arcs, lost), lost)
         self._stand_fast(arcs, solved)
 
     def leave_off(self) -> None:
@@ -237,13 +243,12 @@ class _Job:
         stretch = Stretch(self.model, piece, arcs[rows], self.which[rows], self.first)
         return Energy(self.model, self.before[rows], self.wish(stretch), self.weights)
 
-    def _solve(self, arcs: Tensor, rows: Tensor) -> Solved:
-        """From a fresh guess, for some of the batch."""
-        s, d = self._guess(arcs, rows)
+    def _solve(self, arcs: Tensor, rows: Tensor, s: Tensor, d: Tensor) -> Solved:
+        """From a guess, for some of the batch."""
         energy = self._energy(arcs, rows)
         solved = solve(energy, s, d, self.method, self.steps, self.chance.generator)
         for number in self.which[rows].tolist():
-            self.ways[number].evaluations += solved.evaluations + self.candidates
+            self.ways[number].evaluations += solved.evaluations
         return solved
 
     @torch.no_grad()
@@ -277,8 +282,23 @@ class _Job:
             features = self.model.normalizer.inverse(new[0])
             self.usual = float(energy.mixture(features, new[1]).log_prob(new[0]).median())
         value = energy(*new).nan_to_num(torch.inf).view(len(rows), -1)
+        for number in self.which[rows].tolist():
+            self.ways[number].evaluations += self.candidates
         which = value.argmin(1) + torch.arange(len(rows)) * self.candidates
         return new[0][which], new[1][which]
+
+    @torch.no_grad()
+    def _off(self, arcs: Tensor, solved: Solved) -> Tensor:
+        """Metres (batch,), root mean square, from the path; 0 where nobody asks for one."""
+        energy = self._energy(arcs, torch.arange(len(self.which)))
+        if "path" not in energy.terms or energy.weights.get("path") == 0:
+            return torch.zeros(len(self.which))
+        features = torch.cat(
+            [self.before.frame[:, None], self.model.normalizer.inverse(solved.s)], 1
+        )
+        root = self.model.encoding.root_path(features, self.before.place)[:, 1:, [0, 2]]
+        piece = self.curves.piece(self.arcs - 0.5, arcs.amax(1) + 2.0, self.which)
+        return (root - piece.nearest(root).places).square().sum(-1).mean(1).sqrt()
 
     @torch.no_grad()
     def _astray(self, arcs: Tensor, solved: Solved) -> Tensor:
@@ -286,11 +306,7 @@ class _Job:
         energy = self._energy(arcs, torch.arange(len(self.which)))
         features = self.model.normalizer.inverse(solved.s)
         likely = energy.mixture(features, solved.d).log_prob(solved.s).mean(1)
-        _, positions, _ = energy.decoded(features)
-        root = positions[:, 1:, 0, [0, 2]]
-        piece = self.curves.piece(self.arcs - 0.5, arcs.amax(1) + 2.0, self.which)
-        off = (root - piece.nearest(root).places).square().sum(-1).mean(1).sqrt()
-        well = (off < ASTRAY) & (solved.s.abs().amax((1, 2)) < STRANGE)
+        well = (self._off(arcs, solved) < ASTRAY) & (solved.s.abs().amax((1, 2)) < STRANGE)
         return ~(well & (likely > self.usual - UNLIKELY) & solved.energy.isfinite())
 
     @torch.no_grad()
