@@ -11,6 +11,7 @@ from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .io import read_amc, read_bvh, read_gltf, write_bvh, write_gltf
+    from .solvers.design import design
     from .viewer import show
     from .weights import load
 
@@ -21,6 +22,7 @@ __all__ = [
     "concatenate",
     "contacts",
     "datasets",
+    "design",
     "encodings",
     "forward_kinematics",
     "ik",
@@ -38,6 +40,7 @@ __all__ = [
 # Imported when first used, so that `import motionlab` takes hardly longer than `import torch`.
 _MODULES = ("contacts", "datasets", "encodings", "ik", "io", "metrics", "viewer")
 _FUNCTIONS = {
+    "design": ".solvers.design",
     "load": ".weights",
     "read_amc": ".io",
     "read_bvh": ".io",

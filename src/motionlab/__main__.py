@@ -16,6 +16,7 @@ from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from .commands.clean import Clean
 from .commands.convert import Convert, Retarget
+from .commands.design import Design
 from .commands.evaluate import Evaluate
 from .commands.info import Info
 from .commands.look import Look
@@ -170,6 +171,7 @@ COMMANDS = (
     | Annotated[Train, subcommand("train")]
     | Annotated[Evaluate, subcommand("evaluate")]
     | Annotated[Sample, subcommand("sample")]
+    | Annotated[Design, subcommand("design")]
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Version, subcommand("version")]
 )

@@ -67,3 +67,7 @@ class TrainingError(MotionLabError):
 
 class DivergedError(TrainingError):
     """A training whose loss or gradient is no longer a number."""
+
+
+class SolverError(MotionLabError):
+    """A search was asked for what no motion can do, or what a model can't tell."""

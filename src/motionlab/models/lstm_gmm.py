@@ -131,7 +131,7 @@ class LstmGmm(Recurrent):
         noise : like features; added to what the network sees, in normalised units.
         """
         features = checked_features(self, features)
-        return self._run(features, self.zero_state(len(features)), noise)[0]
+        return self.read(features, self.zero_state(len(features)), noise)[0]
 
     def log_prob(self, features: Tensor, noise: Tensor | None = None) -> Tensor:
         """Log-likelihood (batch, frames - 1) of each frame but the first, given those before it.
@@ -151,7 +151,14 @@ class LstmGmm(Recurrent):
         """Mean negative log-likelihood a frame (eq. 8), in nats."""
         return -self.log_prob(features, noise).mean()
 
-    def _run(self, features: Tensor, state: State, noise: Tensor | None) -> tuple[Mixture, State]:
+    def read(
+        self, features: Tensor, state: State, noise: Tensor | None = None
+    ) -> tuple[Mixture, State]:
+        """What may follow each frame of features (batch, frames, dim) that go on from a state.
+
+        And the state after the last of them. noise : as of `forward`. Nothing is checked: this is
+        what others are made of.
+        """
         if noise is not None:
             features = features + noise * self.normalizer.std
         inputs = self.normalizer(features)  # (batch, frames, kept)
@@ -179,7 +186,7 @@ class LstmGmm(Recurrent):
     # -- one frame after the other ----------------------------------------------------------------
 
     def _seen(self, features: Tensor) -> State:
-        return self._run(features, self.zero_state(len(features)), None)[1]
+        return self.read(features, self.zero_state(len(features)), None)[1]
 
     def predict(self, state: State) -> Mixture:
         """What may follow the frames that a state has seen: (batch, M, ...)."""
@@ -188,7 +195,7 @@ class LstmGmm(Recurrent):
     def step(self, x: Tensor, state: State, noise: Tensor | None = None) -> tuple[Mixture, State]:
         """See one frame more, x (batch, dim): what may follow it, and the state after it."""
         noise = None if noise is None else noise[:, None]
-        mixture, state = self._run(x[:, None], state, noise)
+        mixture, state = self.read(x[:, None], state, noise)
         return Mixture(*(part[:, 0] for part in mixture)), state
 
     def generate(

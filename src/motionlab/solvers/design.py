@@ -1,0 +1,261 @@
+"""From a line on the ground to a walk along it: `motionlab.design`.
+
+    motion, record = motionlab.design([[0, 0], [0, 4], [3, 6]], speed=1.2)
+    print(record["notes"])   # what was wished and could not be, by how much, and where
+
+The motion stands where the path stands: x to the left of one who looks along z, metres, y up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Real
+
+import torch
+from torch import Tensor, nn
+
+from ..encodings import JointAngles
+from ..errors import SolverError
+from ..feet.contacts import label
+from ..feet.lock import lock_feet
+from ..metrics import root_path_error
+from ..models import LstmGmm, Refiner
+from ..models.sampler import Chance
+from ..motion import Motion
+from ..weights import load
+from .path_control import Followed, follow
+from .paths import CORNER, Curves, Path
+from .run_up import pick_start, run_up
+
+STRIDE = 1.1  # seconds, of a walk
+HASTE = 3.0  # deviations above the data's mean step: nobody is faster
+SETTLED = 1.0  # seconds after which a path should be kept
+FAR, LATE, SLOWER = 0.05, 0.5, 0.15  # m, s, share of the speed: what is told
+
+
+def design(
+    points: Tensor | Sequence | Path,
+    speed: float | None = None,
+    start: str | None = None,
+    model: str | nn.Module = "lstm-gmm-contacts",
+    *,
+    times: Tensor | Sequence | None = None,
+    spline: bool = False,
+    corner: float = CORNER,
+    refiner: nn.Module | None = None,
+    lock: bool = False,
+    seed: int = 0,
+    progress: bool = False,
+    **settings,
+) -> tuple[Motion, dict]:
+    """The likeliest motion whose root follows a path (RNN-GAN, section 5.2), and how well it does.
+
+    Parameters
+    ----------
+    points : (n, 2) metres, x and z: corners of a line, or places of a curve. Or a `Path`.
+    speed : m/s, less in sharp bends; 1.2 if nothing is said. Not with times.
+    start : what the character does when the path begins: number or beginning of the name of one of
+        the model's starts, such as "run". None: what suits the speed.
+    model : name of shipped weights, or a model as `motionlab.load` gives it.
+    times : (n,) seconds at which to be at the points, rising; the motion lasts from the first to the
+        last.
+    spline : a smooth curve through the points.
+    corner : metres, radius to which sharper corners are rounded, as people do.
+    refiner : corrects the motion behind the search.
+    lock : hold toes still while they are in contact, at the very end.
+    seed : of all chance.
+    progress : show a bar. Interrupted (Ctrl-C), what is solved so far is given.
+    settings : of `path_control.follow`, such as weights, method, steps, candidates.
+
+    Returns
+    -------
+    The motion, and a record: a dict with "error (cm)", "timing", "largest error", "terms",
+    "evaluations", "seconds", "notes", ...; see `recorded`.
+
+    Raises
+    ------
+    SolverError : no path, times that go back, a speed that is none, no such start, a model or a
+        refiner that can't do it.
+    ModelError : there are no such weights.
+    """
+    path = points if isinstance(points, Path) else Path.through(points, times, spline, corner)
+    return design_all([path], speed, start, model, refiner=refiner, lock=lock, seed=seed,
+                      progress=progress, **settings)[0]  # fmt: skip
+
+
+def design_all(
+    paths: Sequence[Path],
+    speed: float | None = None,
+    start: str | None = None,
+    model: str | nn.Module = "lstm-gmm-contacts",
+    *,
+    refiner: nn.Module | None = None,
+    lock: bool = False,
+    seed: int = 0,
+    progress: bool = False,
+    **settings,
+) -> list[tuple[Motion, dict]]:
+    """`design` for many paths side by side, which takes far less time than one after the other."""
+    name = model if isinstance(model, str) else getattr(model, "about", {}).get("name", "")
+    model = _checked(load(model) if isinstance(model, str) else model, refiner)
+    speed = _speed(speed, paths)
+    fastest = fastest_of(model)
+    tables = [path.timetable(speed, fastest, model.fps) for path in paths]
+    paces = [_pace(table, model.fps) for table in tables]
+    starts = [pick_start(model, start, pace) for pace in paces]
+    sampling = getattr(model, "sampling", {})
+    chance = Chance(torch.Generator().manual_seed(seed), **sampling)
+    before = run_up(model, starts, paths, paces, chance)
+    found = follow(
+        model, paths, before, tables, fastest=fastest, chance=chance, progress=progress, **settings
+    )
+    made = []
+    for path, walked, number, table in zip(paths, found, starts, tables, strict=True):
+        motion = _motion(model, walked, refiner, lock, f"path {path.length:.1f} m", name)
+        record = recorded(motion, path, table, speed, fastest, walked)
+        record["start"] = (getattr(model, "start_names", ()) or ("",) * (number + 1))[number]
+        made.append((motion, record))
+    return made
+
+
+def fastest_of(model: LstmGmm) -> float:
+    """Metres a second that no motion of the model's data goes far beyond."""
+    mean, std = model.normalizer.mean[1], model.normalizer.std[1]
+    return float(model.fps * (mean + HASTE * std))
+
+
+# -- what came of it ------------------------------------------------------------------------------
+
+
+def recorded(
+    motion: Motion, path: Path, table: Tensor, speed: float, fastest: float, walked: Followed
+) -> dict:
+    """How near a motion came to what was wished, fit for JSON.
+
+    "error (cm)" : root mean square and largest distance of the root from the curve that was to be
+    walked, after the first second; "rms to the drawn line" is that to the line before its corners
+    were rounded; "rms of the stride's mean" is that of the mean error over a stride: sway, which comes and
+    goes with each step, is left out.
+    "largest error" : where that was, and when. "timing" : speeds, and how late or early it was.
+    "terms" : nats a frame. "notes" : sentences on what was not reached.
+    """
+    root = motion.positions()[:, motion.skeleton.roles.get("hips", 0)]
+    settled = min(round(SETTLED * motion.fps), len(root) - 1)
+    off = root_path_error(root[:, None, None], path.drawn).rms  # (frames,)
+    worst = settled + int(off[settled:].argmax())
+    aside = _aside(root[settled:, [0, 2]], path)
+    stride = round(STRIDE * motion.fps)
+    mean = aside.unfold(0, stride, 1).mean(-1) if len(aside) > stride else None
+    seconds = (len(root) - 1) / motion.fps
+    way = float(root[:, [0, 2]].diff(dim=0).norm(dim=-1).sum())
+    asked = (len(table) - 1) / motion.fps
+    record = {
+        "path (m)": path.length,
+        "error (cm)": {
+            "rms": 100 * _rms(aside),
+            "rms to the drawn line": 100 * _rms(off[settled:, None] / 100),
+            "rms of the stride's mean": None if mean is None else 100 * _rms(mean),
+            "largest": float(off[worst]),
+        },
+        "largest error": {
+            "seconds": worst / motion.fps,
+            "place (m)": [round(float(x), 2) for x in root[worst, [0, 2]]],
+        },
+        "timing": {
+            "asked (m/s)": None if path.times is not None else speed,
+            "walked (m/s)": way / seconds if seconds else None,
+            "asked (s)": asked if path.times is None else float(path.times[-1] - path.times[0]),
+            "walked (s)": seconds,
+            "missing at the end (m)": float((root[-1, [0, 2]] - path.places[-1]).norm()),
+        },
+        "terms (nats a frame)": walked.parts,
+        "evaluations": walked.evaluations,
+        "begun again": walked.retries,
+        "seconds": walked.seconds,
+        "finished": walked.finished,
+        "interrupted": walked.interrupted,
+    }
+    return record | {"notes": _notes(record, path, speed, fastest)}
+
+
+def _aside(root: Tensor, path: Path) -> Tensor:
+    """From the nearest places of the curve that was to be walked to the root (frames, 2), metres."""
+    zero = torch.zeros(1, dtype=torch.float64)
+    piece = Curves([path]).piece(zero, zero + path.length, torch.tensor([0]))
+    return root.double() - piece.nearest(root[None].double()).places[0]
+
+
+def _rms(off: Tensor) -> float:
+    return float(off.square().sum(1).mean().sqrt())
+
+
+def _notes(record: dict, path: Path, speed: float, fastest: float) -> list[str]:
+    said, timing, error = [], record["timing"], record["error (cm)"]
+    if record["interrupted"]:
+        said.append(f"interrupted: this is the way to {timing['walked (s)']:.1f} s")
+    elif not record["finished"]:
+        said.append(f"did not come to the end within {timing['walked (s)']:.1f} s")
+    if path.times is None and speed > fastest:
+        said.append(
+            f"{speed:g} m/s is faster than anybody in the data; {fastest:.1f} m/s was asked for"
+        )
+    elif path.times is None and timing["walked (m/s)"] is not None:
+        if abs(timing["walked (m/s)"] / speed - 1) > SLOWER:
+            said.append(f"{timing['walked (m/s)']:.2f} m/s on average where {speed:g} was asked")
+    if path.times is not None and timing["missing at the end (m)"] > FAR + 0.15:
+        said.append(f"at the last moment it is {timing['missing at the end (m)']:.1f} m from there")
+    if error["largest"] > 100 * FAR:
+        x, z = record["largest error"]["place (m)"]
+        said.append(
+            f"up to {error['largest']:.0f} cm from the drawn line, at "
+            f"{record['largest error']['seconds']:.1f} s near x {x:g}, z {z:g}"
+        )
+    return said
+
+
+# -- what is given --------------------------------------------------------------------------------
+
+
+def _checked(model: nn.Module, refiner: nn.Module | None) -> LstmGmm:
+    if not isinstance(model, LstmGmm) or not isinstance(model.encoding, JointAngles):
+        raise SolverError(
+            f"A path is followed by an LstmGmm on JointAngles, such as lstm-gmm-contacts; this is "
+            f"{type(model).__name__}."
+        )
+    if getattr(model, "starts", None) is None:
+        raise SolverError("The model has no starts to begin with; take one from motionlab.load.")
+    if refiner is not None and not isinstance(refiner, Refiner):
+        raise SolverError(f"refiner is {type(refiner).__name__}; load one, as refiner-contacts.")
+    if refiner is not None and refiner.encoding.config() != model.encoding.config():
+        raise SolverError("The refiner corrects features of another kind than the model's.")
+    return model
+
+
+def _speed(speed: float | None, paths: Sequence[Path]) -> float:
+    if speed is not None and any(path.times is not None for path in paths):
+        raise SolverError("A path with times has its speeds; leave the speed out.")
+    speed = 1.2 if speed is None else speed
+    if not isinstance(speed, Real) or not 0.1 <= speed < math.inf:
+        raise SolverError(f"speed is {speed!r}; it must be metres a second, 0.1 or more.")
+    return float(speed)
+
+
+def _pace(table: Tensor, fps: float) -> float:
+    """Metres a second that a timetable begins with."""
+    some = min(len(table) - 1, round(fps / 2))
+    return float(table[some] - table[0]) * fps / some
+
+
+def _motion(
+    model: LstmGmm, walked: Followed, refiner: Refiner | None, lock: bool, name: str, source: str
+) -> Motion:
+    features = walked.features
+    if refiner is not None:
+        with torch.no_grad():
+            features = refiner(features[None])[0]
+    motion = model.encoding.to_motion(features, walked.place, name, source)
+    if lock:
+        found = label(motion) if motion.contacts is None else motion.contacts
+        motion = lock_feet(motion, found, floor=None)
+    return motion

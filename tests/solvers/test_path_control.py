@@ -1,0 +1,191 @@
+"""Paths walked by a small network: states that go on exactly, ends, wishes, and no endless loop."""
+
+import pytest
+import torch
+from tiny_lstm import tiny_clips, tiny_lstm
+
+from motionlab.errors import SolverError
+from motionlab.metrics import root_path_error
+from motionlab.models.sampler import Chance
+from motionlab.solvers import path_control, terms
+from motionlab.solvers.energy import Before
+from motionlab.solvers.path_control import follow
+from motionlab.solvers.paths import Path
+from motionlab.solvers.run_up import pick_start, run_up
+
+QUICK = {"steps": 3, "candidates": 2, "fastest": 4.0, "window": 12, "overlap": 6}
+
+
+@pytest.fixture(scope="module")
+def walker():
+    model = tiny_lstm(tiny_clips("walk_1.2", "run_3.0", "walk_0.8_turn_left_0.5"), updates=40)
+    model.start_names = ("walk 1.2 m/s", "run 3.0 m/s", "walk 0.8 m/s, turn left")
+    return model
+
+
+@pytest.fixture(autouse=True)
+def one_try(monkeypatch):
+    """So small a network is always astray."""
+    monkeypatch.setattr(path_control, "RETRIES", 0)
+    monkeypatch.setattr(path_control, "LONGER", 0)
+
+
+def calm(seed=0):
+    return Chance(torch.Generator().manual_seed(seed), temperature=0.3)
+
+
+def beginning(model, paths, paces=None):
+    paces = paces or [1.2] * len(paths)
+    return run_up(model, [0] * len(paths), paths, paces, calm())
+
+
+BENT = Path.through([[0, 0], [0, 0.7], [0.5, 1.1]])
+STRAIGHT = Path.through([[2, 1], [2.8, 1]])
+
+
+@pytest.fixture(scope="module")
+def before(walker):
+    return beginning(walker, [BENT, STRAIGHT])
+
+
+def both(walker, before, seed=0, **options):
+    tables = [path.timetable(1.2, 4.0, 30.0) for path in (BENT, STRAIGHT)]
+    return follow(walker, [BENT, STRAIGHT], before, tables, chance=calm(seed), **QUICK | options)
+
+
+def test_the_motion_begins_where_the_path_does_and_ends_where_it_ends(walker, before):
+    found = both(walker, before)
+    for path, way, place in zip((BENT, STRAIGHT), found, before.place, strict=True):
+        assert way.finished and not way.interrupted and way.features.isfinite().all()
+        torch.testing.assert_close(place[:2], path.places[0])
+        root = walker.encoding.root_path(way.features, way.place)[:, [0, 2]].double()
+        assert (root[-1] - path.places[-1]).norm() < 0.3
+        assert float(root_path_error(root[:, None, [0, 0, 1]], path.places).rms) < 30
+        assert set(way.parts) == {"prior", "noise", "path", "time", "ahead", "resting", "contact"}
+        windows = -(-len(way.features[1:]) // 6)
+        assert way.evaluations >= windows * (3 + 1 + 2) and way.seconds > 0
+    # the same seed walks the same way, another one another way
+    assert torch.equal(both(walker, before)[0].features, found[0].features)
+    other = both(walker, before, seed=1, method="none")
+    assert not torch.equal(other[0].features[:15], found[0].features[:15])
+    energy = lambda ways: sum(sum(way.parts.values()) for way in ways)
+    assert energy(found) < energy(other)  # who searches, too, is nearer to what is wished
+
+
+def test_the_state_goes_on_exactly(walker):
+    """Windows end, and the network knows all that it would know had it never been stopped."""
+    before = beginning(walker, [STRAIGHT])
+    table = STRAIGHT.timetable(1.2, 4.0, 30.0)
+    job = path_control._Job(walker, [STRAIGHT], before, [path_control._Way(table, [before.frame])])
+    job.fastest, job.wish, job.weights, job.chance = 4.0, path_control.wishes, {}, calm()
+    job.method, job.steps, job.candidates, job.window, job.overlap = "none", 1, 1, 12, 6
+    for _ in range(2):
+        job.go_on()
+    frames = torch.cat(job.ways[0].frames)[None]
+    assert frames.shape[1] == 13
+    _, state = walker.read(frames[:, 1:], before.state)  # nothing disturbed it
+    torch.testing.assert_close(job.before.state.cell, state.cell, atol=1e-5, rtol=1e-4)
+    torch.testing.assert_close(job.before.frame, frames[:, -1])
+    root = walker.encoding.root_path(frames, before.place)[0, -1, [0, 2]].double()
+    torch.testing.assert_close(job.before.place[0, :2], root, atol=1e-5, rtol=0)
+
+
+def test_times_fix_the_frames_waits_and_all(walker):
+    path = Path.through([[0, 0], [0, 0.4], [0, 0.4], [0, 0.8]], times=[0, 0.4, 0.6, 1.0])
+    (way,) = follow(
+        walker, [path], beginning(walker, [path]), [path.timetable(1, 4.0, 30.0)],
+        chance=calm(), **QUICK,
+    )  # fmt: skip
+    assert len(way.features) == 31 and way.finished
+
+
+def test_who_never_arrives_stops_all_the_same(walker):
+    """A wish that holds the body back: told, and no endless loop."""
+    stay = lambda stretch: {"stay": terms.speed(0.0, 30.0, std=1e-3)}
+    (way,) = follow(
+        walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [STRAIGHT.timetable(1.2, 4.0, 30.0)],
+        wish=stay, chance=calm(), **QUICK | {"steps": 10},
+    )  # fmt: skip
+    assert way.features.isfinite().all() and len(way.features) < 120
+    assert set(way.parts) == {"prior", "noise", "stay"}
+
+
+def test_who_is_astray_begins_again_so_often_and_no_more(walker, monkeypatch):
+    monkeypatch.setattr(path_control, "ASTRAY", 0.0)
+    monkeypatch.setattr(path_control, "RETRIES", 2)
+    table = STRAIGHT.timetable(1.2, 4.0, 30.0)
+    (way,) = follow(
+        walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [table], chance=calm(), **QUICK
+    )
+    assert way.retries >= 2 and way.retries % path_control.RETRIES == 0
+    assert way.features.isfinite().all()
+
+
+@pytest.mark.parametrize(("rough", "more"), [(0.0, True), (10.0, False)])
+def test_who_is_not_near_goes_on_searching(walker, before, monkeypatch, rough, more):
+    monkeypatch.setattr(path_control, "ROUGH", rough)
+    table = STRAIGHT.timetable(1.2, 4.0, 30.0)
+    looked = []
+    for longer in (0, 1):
+        monkeypatch.setattr(path_control, "LONGER", longer)
+        (way,) = follow(walker, [STRAIGHT], before[[1]], [table], chance=calm(), **QUICK)
+        looked.append(way.evaluations / len(way.features))
+    assert (looked[1] > looked[0]) == more
+
+
+def test_interrupted_it_gives_what_it_has(walker):
+    asked = []
+
+    def wish(stretch):
+        asked.append(stretch.first)
+        if stretch.first == 12:
+            raise KeyboardInterrupt
+        return path_control.wishes(stretch)
+
+    run = lambda wish: follow(
+        walker, [BENT], beginning(walker, [BENT]), [BENT.timetable(1.2, 4.0, 30.0)],
+        wish=wish, chance=calm(), **QUICK,
+    )  # fmt: skip
+    (way,) = run(wish)
+    assert way.interrupted and not way.finished and len(way.features) == 1 + 12 + 6
+
+    def at_once(stretch):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(at_once)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [({"method": "newton"}, "adam, lbfgs"), ({"steps": 0}, "at least 1"),
+     ({"overlap": 12}, "share"), ({"overlap": 0}, "share"), ({"candidates": 0}, "at least 1"),
+     ({"weights": {"way": 2.0}}, "the terms are")],
+)  # fmt: skip
+def test_settings_that_make_no_sense(walker, options, said):
+    before, table = beginning(walker, [STRAIGHT]), STRAIGHT.timetable(1.2, 4.0, 30.0)
+    with pytest.raises(SolverError, match=said):
+        follow(walker, [STRAIGHT], before, [table], chance=calm(), **QUICK | options)
+
+
+# -- the run-up -----------------------------------------------------------------------------------
+
+
+def test_a_start_is_picked_by_name_and_speed(walker):
+    assert [pick_start(walker, None, pace) for pace in (0.9, 2.0, 2.9)] == [0, 0, 1]
+    assert pick_start(walker, "run", 1.0) == 1 and pick_start(walker, "2", 1.0) == 2
+    assert pick_start(walker, "walk 0.8", 1.0) == 2 and pick_start(walker, "walk", 0.8) == 0
+    for wrong in ("fly", "7", ""):
+        with pytest.raises(SolverError, match=r"1 run 3\.0 m/s"):
+            pick_start(walker, wrong, 1.0)
+
+
+def test_the_run_up_leads_onto_the_path(walker):
+    paths = [BENT, STRAIGHT, Path.through([[0, 0], [-2, -2]])]
+    before = run_up(walker, [0, 0, 0], paths, [1.2] * 3, calm())
+    assert isinstance(before, Before) and before.place.shape == (3, 3)
+    for path, place in zip(paths, before.place, strict=True):
+        torch.testing.assert_close(place[:2], path.places[0])
+        ahead = path.places[5] - path.places[0]
+        off = torch.atan2(ahead[0], ahead[1]) - place[2]
+        assert off.cos() > 0.8  # it faces about where it is going
