@@ -76,17 +76,20 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
 
     section = README.partition("## A trained network")[2]
     commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", section, re.MULTILINE)
-    sample, still, dance, prepare, train, tune, again, dancer, game, mended = map(
-        str.split, commands
-    )
+    sample, still, walk, dance, prepare, train, *more = map(str.split, commands)
+    tune, again, rival, dancer, game, mended = more
     # these need data, and minutes or hours
-    assert (prepare, train[0], dancer[0]) == (["prepare", "locomotion"], "train", "train")
+    assert prepare == ["prepare", "locomotion"]
+    assert train[0] == dancer[0] == rival[0] == "train" and rival[1] == "pfnn"
     assert game[:2] == ["train", "refiner-contacts"] and mended[3] == f"{game[-1]}/best.safetensors"
     monkeypatch.chdir(tmp_path)
     assert main(sample) == 0
     assert read_bvh("walk.bvh").seconds == 30
     assert main(still) == 0
     assert read_bvh("still_feet.bvh").seconds == 10
+    Path("path.csv").write_text("x,z\n0,0\n0,1\n1,2\n", encoding="utf-8")
+    assert main(walk) == 0
+    assert read_bvh("round.bvh").seconds > 1.5
     assert main(dance) == 0
     assert read_bvh("dance.bvh").seconds == 30
     (tmp_path / "my_clips").mkdir()

@@ -20,6 +20,7 @@ from torch import Tensor, nn
 
 import motionlab
 from motionlab import metrics
+from motionlab.errors import DataError
 from motionlab.training import Prepared
 from motionlab.weights import find
 
@@ -49,14 +50,24 @@ def main(arguments: list[str] | None = None) -> None:
     data = Prepared.find(chosen.data).matching(model.encoding)
     result = {"weights": record.about_weights(model, path), "split": chosen.split}
     for gait in GAITS:
-        begun, speeds = starts(data, gait, chosen.split, chosen.starts)
+        try:
+            begun, speeds, clips = starts(data, gait, chosen.split, chosen.starts)
+        except DataError as error:
+            result[gait] = {"not measured": str(error)}
+            continue
         result[gait] = told(model, begun, speeds, gait, model.sampling)
+        result[gait]["clips"] = {
+            name: its._asdict() for name, its in people(clips, speeds, round(model.fps)).items()
+        }
     output = chosen.output or f"results/{Path(chosen.model).stem.replace('-', '_')}_pace.json"
     record.write(record.provenance(begin, 0, data) | result, output)
 
 
-def starts(data: Prepared, gait: str, split: str, count: int) -> tuple[Tensor, Tensor]:
-    """Seconds of steady motion (starts, frames, dim), evenly of all there are, and their speeds."""
+def starts(
+    data: Prepared, gait: str, split: str, count: int
+) -> tuple[Tensor, Tensor, list[Tensor]]:
+    """Seconds of steady motion (starts, frames, dim), evenly of all there are, their speeds, and how
+    fast (frames,) each clip goes on, as long as it does."""
     fps, (least, most) = data.encoding.fps, GAITS[gait]
     seen, rest, third = round(OBSERVED * fps), round(AFTER * fps), round(OBSERVED * fps / 3)
     found = []
@@ -67,9 +78,28 @@ def starts(data: Prepared, gait: str, split: str, count: int) -> tuple[Tensor, T
             mean = float(second.mean())
             held = [part.mean() / mean for part in (second[:third], second[-third:], after)]
             if least <= mean < most and all(abs(h - 1) <= STEADY for h in held):
-                found.append((clip[frame : frame + seen], mean))
+                found.append((clip[frame : frame + seen], mean, after))
+    if not found:
+        raise DataError(f"{split}: no clip of these data keeps the pace of a {gait} for as long.")
     chosen = [found[i] for i in rollouts.spread_evenly(len(found), count)]
-    return torch.stack([clip for clip, _ in chosen]), torch.tensor([speed for _, speed in chosen])
+    begun, speeds, clips = zip(*chosen, strict=True)
+    return torch.stack(begun), torch.tensor(speeds), list(clips)
+
+
+def people(clips: list[Tensor], speeds: Tensor, fps: int) -> dict[str, metrics.Interval]:
+    """Speed over the start's of the clips themselves, of those that last as long."""
+    found = {}
+    for first, last in SPANS:
+        lasting = [
+            float(clip[first * fps : last * fps].mean() / speed)
+            for clip, speed in zip(clips, speeds, strict=True)
+            if len(clip) >= last * fps
+        ]
+        if lasting:
+            found[f"{first}-{last} s"] = metrics.bootstrap(
+                lasting, lambda some: sum(some) / len(some)
+            )
+    return found
 
 
 @torch.no_grad()

@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> None:
         "doubted": doubted(model, data.clips(chosen.split), familiar),
     }
     for gait in GAITS:
-        begun, speeds = starts(data, gait, chosen.split, chosen.starts)
+        begun, speeds, _ = starts(data, gait, chosen.split, chosen.starts)
         result[gait] = foretold(model, begun, speeds, gait, familiar)
     output = chosen.output or (
         f"results/{Path(chosen.model).stem.replace('-', '_')}_strange_starts.json"

@@ -57,9 +57,15 @@ def command_of(made: dict, source: str) -> str:
             options = [f"--{key.replace('_', '-')} {getattr(trained, key)}" for key in differ]
             if made.get("start"):
                 options.insert(0, f"--from {shipped_as(made['start']) or 'WEIGHTS'}")
-            command = f"motionlab train {made['name']} --preset {title} --data {source}"
-            return " ".join([command, *options])
+            if source != "locomotion" or not free_only(made):
+                options.insert(0, f"--data {source}")
+            return " ".join([f"motionlab train {made['name']} --preset {title}", *options])
     raise MotionLabError(NO_PRESET)
+
+
+def free_only(made: dict) -> bool:
+    """Whether it was trained on what of its data is free for commercial use: its name says so."""
+    return made["name"].endswith("-permissive")
 
 
 def command_of_game(made: dict, generator: str) -> str:

@@ -17,7 +17,7 @@ from motionlab.training.games import GamePreset
 from motionlab.training.judging import Judge
 
 from ..common import record
-from .cards import command_of_game, licence_of, refiner_card
+from .cards import command_of_game, free_only, licence_of, refiner_card
 from .weights import FOLDER, rounded, with_data
 
 
@@ -45,7 +45,8 @@ def ship(name: str, file: Path, generator: str | None, source: str, folder: Path
     about = {
         **{key: made[key] for key in ("preset", "data", "step", "seconds")},
         "name": name, "model": made["name"], "generator": of, "generator_hash": model.hash,
-        "command": command_of_game(made, of), "data_name": source, "judged": told, "licence": licence,
+        "command": command_of_game(made, of), "judged": told,
+        "data_name": source + " --permissive" * (source == "locomotion" and free_only(made)), "licence": licence,
         "unrefined": judge.unrefined, "real": judge.real,
     }  # fmt: skip
     path = folder / f"{name}.safetensors"

@@ -29,7 +29,7 @@ from motionlab.training.finish import fit_temperature
 from motionlab.training.starts import before_starts
 
 from ..common import record
-from .cards import card, command_of, licence_of
+from .cards import card, command_of, free_only, licence_of
 
 FOLDER = Path(motionlab.__file__).parent / "weights"
 
@@ -76,7 +76,7 @@ def ship(
         "name": name,
         "model": made["name"],
         "command": command_of(made, source),
-        "data_name": source,
+        "data_name": source + " --permissive" * (source == "locomotion" and free_only(made)),
         "starts": starts,
         "sampling": sampling,
         **facts,
@@ -92,8 +92,8 @@ def ship(
 
 def with_data(file: Path, source: str) -> tuple[Prepared, nn.Module, dict]:
     """The data that weights were trained on, the weights, and what is said of them."""
-    data = Prepared.find(source)
     model, made = load_weights(file)
+    data = Prepared.find(source, permissive=free_only(made))
     if made["data"] != data.hash:
         raise MotionLabError(f"{file}: was not trained on {source}; name the data that it was.")
     return data, model, made

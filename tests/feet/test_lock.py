@@ -68,16 +68,17 @@ def test_what_slid_holds_still_and_nothing_pops(speed, turn_rate):
 
 def test_a_leg_that_was_straight_does_not_snap():
     model, refiner = load("lstm-gmm-contacts"), load("refiner-contacts")
-    start = model.start_names.index("run 2.6 m/s, turn left")  # whose legs are quite straight
+    runs = [i for i, n in enumerate(model.start_names) if n.startswith("run") and "m/s" in n]
     with torch.no_grad():
         features = refiner(
             model.generate(
                 300, model.starts, generator=torch.Generator().manual_seed(3), **model.sampling
             )
         )
-    dream = model.encoding.to_motion(features[start])
-    locked = lock_feet(dream, floor=None)
-    assert peak_acceleration(locked) < 1.2 * peak_acceleration(dream)
+    for start in runs:  # some of whose legs are quite straight
+        dream = model.encoding.to_motion(features[start])
+        locked = lock_feet(dream, floor=None)
+        assert peak_acceleration(locked) < 1.2 * peak_acceleration(dream)
 
 
 def test_feet_keep_the_way_they_point_and_bones_their_length():

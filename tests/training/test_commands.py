@@ -74,6 +74,10 @@ def test_permissive_weights_are_trained_on_what_is_free(here, monkeypatch, gaits
     assert [path.name for path in (here / "runs").glob("*.npz")] == ["locomotion-permissive.npz"]
     model = motionlab.load(here / "runs" / "lstm-gmm-permissive-smoke" / "best.safetensors")
     assert "contacts" in model.encoding.slices
+    monkeypatch.setattr(judging, "UPDATES", 5)
+    weights = "runs/lstm-gmm-permissive-smoke/best.safetensors"
+    assert main(["train", "refiner-permissive", *smoke, "--from", weights]) == 0
+    assert [path.name for path in (here / "runs").glob("*.npz")] == ["locomotion-permissive.npz"]
     assert main(["train", "lstm-gmm-contacts", *smoke]) == 0
     assert asked[1:] == [("locomotion", False)]
 
@@ -106,7 +110,7 @@ def test_a_refiner_is_trained_judged_and_used(here, capsys, monkeypatch):
         (["train", "lstm-gmm-contacts", *SMOKE, "--from", "r/best.safetensors", "--out", "b"],
          "is a refiner"),
         ([*play, "--learning-rate", "0.1"], "has two"),
-        (["train", "pfnn"], "refiner-contacts"),
+        (["train", "mvae"], "refiner-contacts"),
     ]:  # fmt: skip
         assert main(wrong) == 1, wrong
         assert said in capsys.readouterr().err

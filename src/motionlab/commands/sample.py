@@ -106,12 +106,14 @@ class Sample(Rig):
     def _refiner(self, model: nn.Module) -> nn.Module | None:
         """What corrects motion of a model, if that is wanted."""
         from ..models import Refiner
-        from ..weights import load
+        from ..weights import load, names
 
         if not self.refine and self.refiner is None:
             return None
-        contacts = "contacts" in model.encoding.slices
-        name = self.refiner or ("refiner-contacts" if contacts else "refiner")
+        its = self.model.replace("lstm-gmm", "refiner")  # as shipped weights are called
+        if its not in names():
+            its = "refiner-contacts" if "contacts" in model.encoding.slices else "refiner"
+        name = self.refiner or its
         refiner = load(name)
         if not isinstance(refiner, Refiner):
             raise MotionLabError(f"--refiner {name}: is no refiner, but {type(refiner).__name__}.")

@@ -23,9 +23,9 @@ class Train:
 
     model: Positional[str]
     """lstm-gmm, lstm-gmm-contacts, lstm-gmm-permissive (with contacts, on the clips that are free
-    for commercial use); pfnn; refiner, refiner-contacts of the first two; or METHOD-STYLE, such as
-    aclstm-indian: one of the methods aclstm, lstm-3lr, scheduled, erd, seq2seq on one of the styles
-    martial, indian, hybrid, walking."""
+    for commercial use); pfnn; refiner, refiner-contacts, refiner-permissive of the first three; or
+    METHOD-STYLE, such as aclstm-indian: one of the methods aclstm, lstm-3lr, scheduled, erd,
+    seq2seq on one of the styles martial, indian, hybrid, walking."""
     preset: Literal["smoke", "table", "ship", "paper"] = "table"
     """How long and how large; see motionlab.training.presets, and games for refiners."""
     data: Annotated[str | None, arg(metavar="NAME|FOLDER|FILE")] = None
@@ -61,6 +61,11 @@ class Train:
             known = ", ".join([*PRESETS, *GAMES])
             raise MotionLabError(f"There is no model {self.model!r} to train; there are {known}.")
 
+    @property
+    def _free(self) -> bool:
+        """Whether to leave out what is not free for commercial use."""
+        return self.data is None and self.model.endswith("-permissive")
+
     def _learn(self, preset: Preset, out: Path) -> None:
         import torch
 
@@ -78,8 +83,7 @@ class Train:
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
         walks = self.model == "pfnn" or "lstm-gmm" in self.model
         style = "locomotion" if walks else self.model.rpartition("-")[2]
-        free = self.data is None and self.model.endswith("-permissive")
-        data = Prepared.find(self.data or style, free, **self.folder.reading())
+        data = Prepared.find(self.data or style, self._free, **self.folder.reading())
         if self.model == "lstm-gmm":
             data = data.without_contacts()
         start = find(self.start) if self.start else None
@@ -114,7 +118,7 @@ class Train:
         start = find(self.start or self.model.replace("refiner", "lstm-gmm"))
         generator = load(start)
         check_generates(generator, self.start or self.model)
-        data = Prepared.find(self.data or "locomotion", **self.folder.reading())
+        data = Prepared.find(self.data or "locomotion", self._free, **self.folder.reading())
         sampling = preset.sampling(generator.sampling)
         judge = Judge(
             generator, data, sampling=sampling

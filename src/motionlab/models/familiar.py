@@ -11,10 +11,10 @@ the second before a start, and those of held-out motion say which of them are st
   poses stay calm, and so are foretold well, but nobody has stood like this.
 
 Neither sees all. With the bounds of the shipped `lstm-gmm-contacts`, each passed by one held-out
-second in a hundred, 2.4 % of the seconds of test clips are doubted without need. Doubted are all
+second in a hundred, 1.6 % of the seconds of test clips are doubted without need. Doubted are all
 that are in a unit 100 times too large or too small or have left and right exchanged, all that are 4
-times too fast and half of those that are twice too fast; but one in eight of those that run
-backwards, 1.4 % of those that are 4 times too slow, and none that stand still in the pose of the
+times too fast and five in six of those that are twice too fast; but only a third of those that run
+backwards, 1.5 % of those that are 4 times too slow, and none that stand still in the pose of the
 skeleton's file. Weights that foretell held-out motion badly have wide bounds, and doubt less. So the
 rule is sound for what is doubted, which is worth a look; what is not doubted may still be wrong.
 `experiments/rnn_gan/strange_starts.py` measures it.

@@ -1,7 +1,7 @@
 """How unlikely, and how far from what is wished, a window of motion is (RNN-GAN, eq. 15 to 20).
 
 Maximum a posteriori: of all motions s and disturbances d that may go on from here, which is both
-likely under the network and near to what is wished? The energy is the negative logarithm of both,
+likely under the network and near to what is wished? The energy is the negative logarithm of both::
 
     E(s, d) = -log p(s | s_0, d) + |d|² / 2σ² + Σ weight · term(s),
 

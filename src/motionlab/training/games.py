@@ -142,4 +142,4 @@ _SIZES = {
     "ship": _OURS,
     "paper": GamePreset(steps=10_000, validate_every=500),
 }  # fmt: skip
-GAMES = {name: _SIZES for name in ("refiner", "refiner-contacts")}
+GAMES = {name: _SIZES for name in ("refiner", "refiner-contacts", "refiner-permissive")}

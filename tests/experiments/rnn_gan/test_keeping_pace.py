@@ -7,6 +7,7 @@ import torch
 
 from experiments.rnn_gan import keeping_pace
 from motionlab import metrics
+from motionlab.errors import DataError
 from motionlab.training import prepare
 
 
@@ -34,7 +35,7 @@ def going_on(data, factor, lost=0):
 @pytest.fixture(scope="module", params=["walk", "run"])
 def begun(gaits, request):
     gait = request.param
-    some, speeds = keeping_pace.starts(gaits, gait, "train", 4)
+    some, speeds, _ = keeping_pace.starts(gaits, gait, "train", 4)
     glides = some[:, -1, 1] * gaits.encoding.fps
     return gait, some, speeds, glides
 
@@ -50,12 +51,28 @@ def test_starts_are_steady_and_of_their_gait(gaits, begun):
 
 
 def test_no_start_is_of_a_clip_that_stops(gaits):
-    whole, _ = keeping_pace.starts(gaits, "run", "train", 10_000)
+    whole, *_ = keeping_pace.starts(gaits, "run", "train", 10_000)
     names = [n for n, s in zip(gaits.names, gaits.splits, strict=True) if s == "train"]
     stops = [c for n, c in zip(names, gaits.clips("train"), strict=True) if "stop" in n]
     assert stops
     windows = torch.cat([clip.unfold(0, 30, 1).mT for clip in stops])
     assert not any((windows == start).all(-1).all(-1).any() for start in whole)
+
+
+def test_clips_that_last_tell_how_people_go_on(gaits):
+    _, speeds, clips = keeping_pace.starts(gaits, "walk", "train", 50)
+    found = keeping_pace.people(clips, speeds, 30)
+    assert found["1-3 s"].value == pytest.approx(1, abs=0.1)
+    assert found["1-3 s"].clips == sum(len(clip) >= 90 for clip in clips) > 0
+    assert "30-60 s" not in found
+    slower = keeping_pace.people([clip / 2 for clip in clips], speeds, 30)
+    assert slower["1-3 s"].value == pytest.approx(found["1-3 s"].value / 2)
+
+
+def test_where_nobody_keeps_a_pace_it_is_said(gaits, monkeypatch):
+    monkeypatch.setitem(keeping_pace.GAITS, "run", (8.0, 9.0))
+    with pytest.raises(DataError, match="train: no clip .* of a run"):
+        keeping_pace.starts(gaits, "run", "train", 4)
 
 
 @pytest.mark.parametrize("factor, kept", [(1.0, True), (1.04, True), (0.8, False), (0.4, False)])

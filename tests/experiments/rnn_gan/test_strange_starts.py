@@ -1,14 +1,17 @@
 """Which starts are doubted, and which samples leave their gait: the counts, and that they run."""
 
+import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 import torch
 
-from experiments.rnn_gan import strange_starts
+from experiments.rnn_gan import keeping_pace, strange_starts
 from experiments.rnn_gan.strange_starts import auc, doubted, faults, foretold, planted
 from motionlab import datasets
 from motionlab.models.familiar import Familiar
+from motionlab.training import PRESETS, build, checkpoints
 from tests.tiny_lstm import tiny_lstm
 
 
@@ -82,3 +85,19 @@ def test_what_is_lost_leaves(monkeypatch, model):
     monkeypatch.setattr(strange_starts.rollouts, "sampled", lambda *_, **__: [(0, made)])
     only = SimpleNamespace(fps=30.0, encoding=model.encoding, sampling={})
     assert strange_starts.leaving(only, made[:, :30], torch.ones(2), "walk", 0).all()
+
+
+def test_both_experiments_that_go_on_from_steady_starts_run(gaits, tmp_path, monkeypatch):
+    gaits.save(tmp_path / "gaits.npz")
+    model = build(gaits, replace(PRESETS["lstm-gmm"]["smoke"], width=16))
+    about = {"preset": {}, "update": 0, "familiar": Familiar(-1e9, 1e9)._asdict()}
+    checkpoints.save_weights(tmp_path / "w.safetensors", model, about)
+    monkeypatch.setattr(keeping_pace, "SEEDS", (0,))
+    monkeypatch.setattr(strange_starts, "SEEDS", (0,))
+    monkeypatch.setattr(keeping_pace, "SPANS", ((0, 1), (1, 2)))
+    for experiment in (keeping_pace, strange_starts):
+        experiment.main(["--model", str(tmp_path / "w.safetensors"), "--split", "val",
+                         "--data", str(tmp_path / "gaits.npz"), "--starts", "2",
+                         "--output", str(tmp_path / "r.json")])  # fmt: skip
+        found = json.loads((tmp_path / "r.json").read_text())
+        assert found["split"] == "val" and found["walk"]["starts"] == 2
