@@ -76,9 +76,10 @@ def test_the_state_goes_on_exactly(walker):
     """Windows end, and the network knows all that it would know had it never been stopped."""
     before = beginning(walker, [STRAIGHT])
     table = STRAIGHT.timetable(1.2, 4.0, 30.0)
-    job = path_control._Job(walker, [STRAIGHT], before, [path_control._Way(table, [before.frame])])
-    job.fastest, job.wish, job.weights, job.chance = 4.0, path_control.wishes, {}, calm()
-    job.method, job.steps, job.candidates, job.window, job.overlap = "none", 1, 1, 12, 6
+    job = path_control._Job(
+        walker, [STRAIGHT], before, [path_control._Way(table, [before.frame])], 4.0,
+        path_control.wishes, {}, calm(), "none", 1, 1, 12, 6,
+    )  # fmt: skip
     for _ in range(2):
         job.go_on()
     frames = torch.cat(job.ways[0].frames)[None]

@@ -9,7 +9,7 @@ import motionlab
 from motionlab.__main__ import main
 from motionlab.datasets import gaits
 from motionlab.errors import SolverError
-from motionlab.solvers.design import design_all, fastest_of
+from motionlab.solvers.design import design_all, enlarged, fastest_of
 from motionlab.solvers.paths import Path
 
 QUICK = {"steps": 2, "candidates": 1}
@@ -106,6 +106,30 @@ def test_on_a_larger_rig_the_path_is_where_it_was(here, shipped, capsys):
     assert designed(shipped, "--out", "usual.bvh") == 0
     usual = motionlab.read_bvh("usual.bvh").root_positions
     assert abs(hips[-1, 2] - usual[-1, 2]) < 0.3 and hips[:, 1].mean() > 1.15 * usual[:, 1].mean()
+
+
+def test_on_a_larger_rig_what_was_missed_is_told_in_its_own_metres(here, shipped, model, capsys):
+    (here / "path.csv").write_text("x,z\n0,3\n0,6\n3,6\n")
+    motionlab.write_bvh(gaits.make(seconds=0.2, speed=1.2), "rig.bvh")
+    rig = ["--skeleton", "rig.bvh", "--rig-units", "0.012", "--no-rig-axes"]
+    assert designed(shipped, "--out", "fast.bvh", "--speed", "20", *rig) == 0
+    said = capsys.readouterr().out
+    assert "note: 20 m/s is faster" in said
+    assert f"; {1.2 * fastest_of(model):.1f} m/s was asked" in said
+
+
+def test_a_record_enlarged_keeps_times_and_counts(model):
+    _, record = motionlab.design(CORNER, speed=20, model=model, **QUICK)
+    twice = enlarged(record, 2.0)
+    assert twice["path (m)"] == 2 * record["path (m)"]
+    assert twice["error (cm)"]["rms"] == 2 * record["error (cm)"]["rms"]
+    place = record["largest error"]["place (m)"]
+    assert twice["largest error"]["place (m)"] == pytest.approx([2 * x for x in place])
+    assert twice["largest error"]["seconds"] == record["largest error"]["seconds"]
+    assert twice["timing"]["asked (m/s)"] == 40
+    assert twice["timing"]["asked (s)"] == record["timing"]["asked (s)"]
+    assert twice["evaluations"] == record["evaluations"]
+    assert any(note.startswith("40 m/s is faster") for note in twice["notes"])
 
 
 BAD = [

@@ -13,7 +13,7 @@ from ..errors import MotionLabError, SolverError
 from ..io.root_motion import KINDS
 from .clips import WRITERS, check_no_fbx
 from .rig import Rig, brought_onto
-from .sample import check_seed, check_writable
+from .sample import check_seed, check_writable, refiner_of
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -56,7 +56,7 @@ class Design(Rig):
     these are left out."""
 
     def run(self) -> None:
-        from ..solvers.design import design_all
+        from ..solvers.design import design_all, enlarged
         from ..solvers.paths import Path as Way
         from ..weights import load
 
@@ -68,10 +68,7 @@ class Design(Rig):
         check_writable(self.out)
         rig = None if self.skeleton is None else self.find_rig(self.skeleton)
         model = load(self.model)
-        refiner = None
-        if self.refine:
-            contacts = "contacts" in model.encoding.slices
-            refiner = load("refiner-contacts" if contacts else "refiner")
+        refiner = refiner_of(model, self.model) if self.refine else None
         larger = 1.0 if self.skeleton is None else _larger(model.encoding.skeleton, rig)
         try:
             # another body goes as much farther in a step as its legs are longer
@@ -97,7 +94,8 @@ class Design(Rig):
             motion, about = brought_onto(motion, rig)
             said += about
         said += self.write(motion, self.out, self.root_motion)
-        error = larger * record["error (cm)"]["rms"]
+        record = enlarged(record, larger)
+        error = record["error (cm)"]["rms"]
         about = f"{motion.seconds:.1f} s from {record['start']!r}, {error:.1f} cm from the path"
         print(f"{self.out}: {'; '.join([about, *said])}")
         for note in record["notes"]:

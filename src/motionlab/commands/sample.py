@@ -70,7 +70,9 @@ class Sample(Rig):
         rig = None if self.skeleton is None else self.find_rig(self.skeleton)
         model = load(self.model)
         check_generates(model, self.model)
-        refiner = self._refiner(model)
+        refiner = None
+        if self.refine or self.refiner is not None:
+            refiner = refiner_of(model, self.model, self.refiner)
         paths, frames = self._paths(), self._frames(model.fps)
         chosen = self._starts(model.start_names)
         check_seed(self.seed)
@@ -102,31 +104,6 @@ class Sample(Rig):
             said += self.write(motion, path, self.root_motion)
             about = f"{motion.seconds:.1f} s from {model.start_names[start]!r}"
             print(f"{path}: {'; '.join([about, *said])}")
-
-    def _refiner(self, model: nn.Module) -> nn.Module | None:
-        """What corrects motion of a model, if that is wanted."""
-        from ..models import Refiner
-        from ..weights import load, names
-
-        if not self.refine and self.refiner is None:
-            return None
-        its = self.model.replace("lstm-gmm", "refiner")  # as shipped weights are called
-        if its not in names():
-            its = "refiner-contacts" if "contacts" in model.encoding.slices else "refiner"
-        name = self.refiner or its
-        refiner = load(name)
-        if not isinstance(refiner, Refiner):
-            raise MotionLabError(f"--refiner {name}: is no refiner, but {type(refiner).__name__}.")
-        if refiner.encoding.config() != model.encoding.config():
-            raise MotionLabError(
-                f"{name} refines features of another kind than {self.model}'s: with contacts or "
-                "without, as angles or not, of another body or frame rate."
-            )
-        made_for = refiner.about.get("generator_hash")
-        if made_for not in (None, model.hash):
-            print(f"{name} learned to correct motion of another generator than {self.model}; it may "
-                  "help less, and its licence holds as well", flush=True)  # fmt: skip
-        return refiner
 
     def _frames(self, fps: float) -> int:
         if not 0 < self.seconds < math.inf:
@@ -175,6 +152,35 @@ def locked(motion: Motion) -> Motion:
 
     found = label(motion) if motion.contacts is None else motion.contacts
     return lock_feet(motion, found, floor=None)
+
+
+def refiner_of(model: nn.Module, called: str, named: str | None = None) -> nn.Module:
+    """What corrects motion of a model: the refiner that is named, or the shipped one that suits it.
+
+    Raises
+    ------
+    MotionLabError : it is no refiner, or refines features of another kind.
+    """
+    from ..models import Refiner
+    from ..weights import load, names
+
+    its = called.replace("lstm-gmm", "refiner")  # as shipped weights are called
+    if its not in names():
+        its = "refiner-contacts" if "contacts" in model.encoding.slices else "refiner"
+    name = named or its
+    refiner = load(name)
+    if not isinstance(refiner, Refiner):
+        raise MotionLabError(f"--refiner {name}: is no refiner, but {type(refiner).__name__}.")
+    if refiner.encoding.config() != model.encoding.config():
+        raise MotionLabError(
+            f"{name} refines features of another kind than {called}'s: with contacts or "
+            "without, as angles or not, of another body or frame rate."
+        )
+    made_for = refiner.about.get("generator_hash")
+    if made_for not in (None, model.hash):
+        print(f"{name} learned to correct motion of another generator than {called}; it may "
+              "help less, and its licence holds as well", flush=True)  # fmt: skip
+    return refiner
 
 
 def check_generates(model: nn.Module, name: str) -> None:

@@ -164,6 +164,7 @@ def recorded(
         },
         "timing": {
             "asked (m/s)": None if path.times is not None else speed,
+            "fastest (m/s)": fastest,
             "walked (m/s)": way / seconds if seconds else None,
             "asked (s)": asked if path.times is None else float(path.times[-1] - path.times[0]),
             "walked (s)": seconds,
@@ -176,7 +177,27 @@ def recorded(
         "finished": walked.finished,
         "interrupted": walked.interrupted,
     }
-    return record | {"notes": _notes(record, path, speed, fastest)}
+    return record | {"notes": _notes(record)}
+
+
+def enlarged(record: dict, larger: float) -> dict:
+    """What `recorded` says, of the same motion on a body whose ways are so many times as long."""
+
+    def times(values: dict, units: tuple[str, ...]) -> dict:
+        return {
+            name: larger * value if value is not None and name.endswith(units) else value
+            for name, value in values.items()
+        }
+
+    error = {name: None if cm is None else larger * cm for name, cm in record["error (cm)"].items()}
+    worst = record["largest error"]
+    place = [round(larger * metres, 2) for metres in worst["place (m)"]]
+    record = times(record, ("(m)",)) | {
+        "error (cm)": error,
+        "largest error": worst | {"place (m)": place},
+        "timing": times(record["timing"], ("(m)", "(m/s)")),
+    }
+    return record | {"notes": _notes(record)}
 
 
 def _aside(root: Tensor, path: Path) -> Tensor:
@@ -190,20 +211,21 @@ def _rms(off: Tensor) -> float:
     return float(off.square().sum(1).mean().sqrt())
 
 
-def _notes(record: dict, path: Path, speed: float, fastest: float) -> list[str]:
+def _notes(record: dict) -> list[str]:
     said, timing, error = [], record["timing"], record["error (cm)"]
+    asked, walked = timing["asked (m/s)"], timing["walked (m/s)"]
     if record["interrupted"]:
         said.append(f"interrupted: this is the way to {timing['walked (s)']:.1f} s")
     elif not record["finished"]:
         said.append(f"did not come to the end within {timing['walked (s)']:.1f} s")
-    if path.times is None and speed > fastest:
+    if asked is not None and asked > timing["fastest (m/s)"]:
         said.append(
-            f"{speed:g} m/s is faster than anybody in the data; {fastest:.1f} m/s was asked for"
+            f"{asked:g} m/s is faster than anybody in the data; {timing['fastest (m/s)']:.1f} m/s "
+            "was asked for"
         )
-    elif path.times is None and timing["walked (m/s)"] is not None:
-        if abs(timing["walked (m/s)"] / speed - 1) > SLOWER:
-            said.append(f"{timing['walked (m/s)']:.2f} m/s on average where {speed:g} was asked")
-    if path.times is not None and timing["missing at the end (m)"] > FAR + 0.15:
+    elif asked is not None and walked is not None and abs(walked / asked - 1) > SLOWER:
+        said.append(f"{walked:.2f} m/s on average where {asked:g} was asked")
+    if asked is None and timing["missing at the end (m)"] > FAR + 0.15:
         said.append(f"at the last moment it is {timing['missing at the end (m)']:.1f} m from there")
     if error["largest"] > 100 * FAR:
         x, z = record["largest error"]["place (m)"]

@@ -149,12 +149,14 @@ def follow(
     if chance is None:
         chance = Chance(torch.Generator().manual_seed(0), **getattr(model, "sampling", {}))
     _check(method, steps, candidates, window, overlap)
-    job = _Job(model, list(paths), before, [_Way(*row) for row in zip(
-        (table.double() for table in tables), ([f] for f in before.frame[:, None]), strict=True
-    )])  # fmt: skip
-    job.fastest, job.wish, job.weights, job.chance = fastest, wish, weights or {}, chance
-    job.method, job.steps, job.candidates = method, steps, candidates
-    job.window, job.overlap = window, overlap
+    ways = [
+        _Way(table.double(), [frame])
+        for table, frame in zip(tables, before.frame[:, None], strict=True)
+    ]
+    job = _Job(
+        model, list(paths), before, ways, fastest, wish, weights or {}, chance, method, steps,
+        candidates, window, overlap,
+    )  # fmt: skip
     begin, longest, interrupted = time.process_time(), max(map(len, tables)) - 1, False
     with tqdm(total=longest, unit="frame", disable=not progress, leave=False) as bar:
         try:
@@ -182,6 +184,15 @@ class _Job:
     paths: list[Path]
     before: Before
     ways: list[_Way]
+    fastest: float
+    wish: Wishes
+    weights: Mapping[str, float]
+    chance: Chance
+    method: str
+    steps: int
+    candidates: int
+    window: int
+    overlap: int
 
     def __post_init__(self) -> None:
         self.curves, self.which = Curves(self.paths), torch.arange(len(self.paths))
