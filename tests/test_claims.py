@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import aclstm_cases
+import path_cases
 import pytest
 import refiner_cases
 import yaml
@@ -209,6 +210,7 @@ CASES = [
     ("W10", "not", sizes(9, 9, 9)),
     *aclstm_cases.CASES,
     *refiner_cases.CASES,
+    *path_cases.CASES,
 ]  # fmt: skip
 
 

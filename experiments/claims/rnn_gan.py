@@ -254,6 +254,40 @@ def w4_generator(limits: dict, fit: dict, plain: dict, contact: dict) -> Verdict
     return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
 
 
+def w5(limits: dict, found: dict) -> Verdict:
+    ours, rival = "ours, refined and locked", "PFNN, the authors'"
+    numbers, held, middle, whole = {}, {}, {}, []
+    for gait, its in found["gaits"].items():
+        told, error = its["methods"][ours], "rms (cm)"
+        seeds = {name: [row[error] for row in rows] for name, rows in its["curves"][ours].items()}
+        if any(len(each) < 3 for each in seeds.values()):
+            raise Absent("fewer than three seeds a curve")
+        theirs = {name: rows[0][error] for name, rows in its["curves"][rival].items()}
+        papers = [name for name in seeds if name.startswith(("circle", "sine"))]
+        nearer = [sum(seeds[name]) / len(seeds[name]) < theirs[name] for name in papers]
+        ratio = told["rms over PFNN's"]
+        held[gait], middle[gait] = all(nearer), ratio["high"] < 1
+        whole += [told["without broken frames"] >= limits["sound"]]
+        whole += [told["finished"] >= limits["finished"]]
+        numbers |= {
+            f"{gait}: root mean square error, median (cm)": told["median"][error]["value"],
+            f"{gait}: PFNN's": its["methods"][rival]["median"][error]["value"],
+            f"{gait}: ours over PFNN's, median": ratio["value"],
+            f"{gait}: the same, 95 % interval": f"{ratio['low']:.3g} to {ratio['high']:.3g}",
+            f"{gait}: circles and sines on which ours is nearer": f"{sum(nearer)} of {len(nearer)}",
+            f"{gait}: without broken frames": told["without broken frames"],
+            f"{gait}: came to the end": told["finished"],
+        }
+    if set(held) != {"walk", "run"}:
+        raise Absent("walking and running are both asked for")
+    if all(held.values()) and all(middle.values()):
+        if all(whole):
+            return Verdict(REPRODUCED, numbers)
+        return Verdict(PARTLY, numbers, "too many broken or unfinished motions")
+    some = (held["walk"] and middle["walk"]) or all(middle.values())
+    return Verdict(PARTLY if some else NOT, numbers)
+
+
 def w8(limits: dict, found: dict) -> Verdict:
     hop = found["hop (m/s²)"]  # at the last recorded frame, and at the next
     zero, estimated = (hop[state][0] / hop["observed"][0] for state in ("zero", "estimated"))
@@ -300,5 +334,5 @@ RULES = {
     "W1-variety": w1_variety, "W1-variety-memory": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
     "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
     "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W3": w3, "W4": w4,
-    "W4-generator": w4_generator, "W8": w8, "W10": w10, "W11": w11,
+    "W4-generator": w4_generator, "W5": w5, "W8": w8, "W10": w10, "W11": w11,
 }  # fmt: skip
