@@ -69,5 +69,9 @@ class DivergedError(TrainingError):
     """A training whose loss or gradient is no longer a number."""
 
 
+class WayError(MotionLabError):
+    """A line on the ground that is none, or that nobody can go along."""
+
+
 class SolverError(MotionLabError):
     """A search was asked for what no motion can do, or what a model can't tell."""

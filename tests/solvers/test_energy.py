@@ -9,9 +9,9 @@ from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import SolverError
 from motionlab.feet.contacts import rest_heights
 from motionlab.models import LstmGmm
+from motionlab.paths import Curves, Path
 from motionlab.solvers import terms
 from motionlab.solvers.energy import NOISE, Energy
-from motionlab.solvers.paths import Curves, Path
 
 
 @pytest.fixture(scope="module")

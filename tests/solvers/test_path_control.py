@@ -7,10 +7,10 @@ from tiny_lstm import tiny_clips, tiny_lstm
 from motionlab.errors import SolverError
 from motionlab.metrics import root_path_error
 from motionlab.models.sampler import Chance
+from motionlab.paths import Path
 from motionlab.solvers import path_control, terms
 from motionlab.solvers.energy import Before
 from motionlab.solvers.path_control import follow
-from motionlab.solvers.paths import Path
 from motionlab.solvers.run_up import pick_start, run_up
 
 QUICK = {"steps": 3, "candidates": 2, "fastest": 4.0, "window": 12, "overlap": 6}

@@ -8,9 +8,9 @@ import torch
 import motionlab
 from motionlab.__main__ import main
 from motionlab.datasets import gaits
-from motionlab.errors import SolverError
+from motionlab.errors import MotionLabError, SolverError, WayError
+from motionlab.paths import Path
 from motionlab.solvers.design import design_all, enlarged, fastest_of
-from motionlab.solvers.paths import Path
 
 QUICK = {"steps": 2, "candidates": 1}
 CORNER = [[1, 1], [1, 2.2], [2.2, 2.2]]
@@ -65,8 +65,10 @@ def test_a_window_longer_than_the_path_and_a_lock(model):
      ({"refiner": torch.nn.Linear(1, 1)}, "refiner is Linear")],
 )  # fmt: skip
 def test_what_can_not_be_asked(model, arguments, said):
-    with pytest.raises(SolverError, match=said):
+    with pytest.raises(MotionLabError, match=said) as error:
         motionlab.design(**{"points": CORNER, "model": model} | QUICK | arguments)
+    of_the_path = said in ("two places", "Place 2", "must rise")
+    assert error.type is (WayError if of_the_path else SolverError)
 
 
 # -- motionlab design -----------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from ..errors import MotionLabError, SolverError
+from ..errors import MotionLabError, WayError
 from ..io.root_motion import KINDS
 from .clips import WRITERS, check_no_fbx
 from .rig import Rig, brought_onto
@@ -56,8 +56,8 @@ class Design(Rig):
     these are left out."""
 
     def run(self) -> None:
+        from ..paths import Path as Way
         from ..solvers.design import design_all, enlarged
-        from ..solvers.paths import Path as Way
         from ..weights import load
 
         if self.out.suffix.lower() not in WRITERS:
@@ -76,8 +76,8 @@ class Design(Rig):
                 [[c / larger for c in point] for point in points], times, self.spline,
                 self.corner / larger,
             )  # fmt: skip
-        except SolverError as error:
-            raise SolverError(f"{self.path}: {error}") from error
+        except WayError as error:
+            raise WayError(f"{self.path}: {error}") from error
         speed = None if self.speed is None else self.speed / larger
         lasting = way.length / (speed or 1.2) if times is None else times[-1] - times[0]
         if lasting > LONG:
@@ -122,7 +122,7 @@ def read_path(file: Path) -> tuple[list[list[float]], list[float] | None]:
 
     Raises
     ------
-    SolverError : no such file, no such header, or what is no number, with its line.
+    WayError : no such file, no such header, or what is no number, with its line.
     """
     try:
         with open(file, newline="", encoding="utf-8-sig") as stream:
@@ -131,10 +131,10 @@ def read_path(file: Path) -> tuple[list[list[float]], list[float] | None]:
             ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "it is no text in UTF-8"
-        raise SolverError(f"{file}: can't be read ({reason}).") from error
+        raise WayError(f"{file}: can't be read ({reason}).") from error
     header = [cell.strip().lower() for cell in rows[0][1]] if rows else []
     if header not in COLUMNS:
-        raise SolverError(
+        raise WayError(
             f"{file}, line 1: {','.join(header) or 'nothing'!r}; the header must be x,z or t,x,z, with "
             "metres on the ground (y is up) and seconds below it, separated by commas."
         )
@@ -145,7 +145,7 @@ def read_path(file: Path) -> tuple[list[list[float]], list[float] | None]:
         except ValueError:
             found.append([])
         if len(found[-1]) != len(header):
-            raise SolverError(
+            raise WayError(
                 f"{file}, line {line}: {','.join(row)!r}; {len(header)} numbers are needed."
             )
     timed = header[0] == "t"

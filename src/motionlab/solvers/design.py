@@ -23,9 +23,9 @@ from ..metrics import root_path_error
 from ..models import LstmGmm, Refiner
 from ..models.sampler import Chance
 from ..motion import Motion
+from ..paths import CORNER, Curves, Path
 from ..weights import load
 from .path_control import Followed, follow
-from .paths import CORNER, Curves, Path
 from .run_up import pick_start, run_up
 
 STRIDE = 1.1  # seconds, of a walk
@@ -75,8 +75,8 @@ def design(
 
     Raises
     ------
-    SolverError : no path, times that go back, a speed that is none, no such start, a model or a
-        refiner that can't do it.
+    WayError : no path, or times that go back.
+    SolverError : a speed that is none, no such start, a model or a refiner that can't do it.
     ModelError : there are no such weights.
     """
     path = points if isinstance(points, Path) else Path.through(points, times, spline, corner)

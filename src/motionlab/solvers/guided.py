@@ -19,8 +19,8 @@ from ..encodings.path import turned
 from ..models import LstmGmm
 from ..models.noise import noise_to_draw, normal
 from ..models.sampler import Chance, choose
+from ..paths import Curves
 from .energy import Before
-from .paths import Curves
 
 SHARE = 0.5  # of what is missing, a frame
 SLOW = 0.3  # seconds that averages forget in
@@ -87,8 +87,7 @@ class Steering:
         keep = 1 / (SLOW * self.fps)
         self.velocity = self.velocity + keep * (self.fps * moved - self.velocity)
         self.turn = self.turn + keep * (self.fps * step[:, 2] - self.turn)
-        near = self.curves.piece(self.arcs - 0.2, self.arcs + 0.5, self.which)
-        self.arcs = near.nearest(self.place[:, None, :2]).arcs[:, 0]
+        self.arcs = self.curves.onward(self.place[:, :2], self.arcs, self.which)
 
 
 def recently(recent: Tensor, fps: float) -> tuple[Tensor, Tensor, Tensor]:

@@ -24,10 +24,10 @@ from tqdm import tqdm
 from ..errors import SolverError
 from ..models import LstmGmm
 from ..models.sampler import Chance
+from ..paths import Curves, Path
 from . import terms
 from .energy import Before, Energy
 from .guided import Steering, guided
-from .paths import Curves, Path
 from .window import METHODS, Solved, solve
 
 WINDOW, OVERLAP = 34, 17  # frames, the paper's

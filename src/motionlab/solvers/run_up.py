@@ -11,9 +11,9 @@ from torch import Tensor
 from ..errors import SolverError
 from ..models import LstmGmm
 from ..models.sampler import Chance
+from ..paths import Curves, Path
 from .energy import Before
 from .guided import Steering, guided, recently
-from .paths import Curves, Path
 
 SECONDS = 1.2  # walked straight ahead before the path begins: a stride
 SAMPLES = 6

@@ -26,8 +26,8 @@ from torch import Tensor
 from ..errors import SolverError
 from ..feet.contacts import foot_points, rest_heights
 from ..metrics import facing
+from ..paths import Piece
 from ..skeleton import Skeleton
-from .paths import Piece
 
 Term = Callable[[Tensor, Tensor, Tensor | None], Tensor]
 

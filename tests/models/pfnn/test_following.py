@@ -6,7 +6,7 @@ import pytest
 import torch
 from steady_pfnn import PACE, REST, layout, steady
 
-from motionlab.errors import ModelError
+from motionlab.errors import ModelError, WayError
 from motionlab.models.pfnn.following import follow
 
 
@@ -45,6 +45,11 @@ def test_many_paths_are_as_each_alone():
 def test_paths_are_a_list_of_some(paths):
     with pytest.raises(ModelError, match=r"must be a list, of one path or more: \[points\]"):
         follow(steady(layout()), paths, 1.0)
+
+
+def test_a_path_that_is_none():
+    with pytest.raises(WayError, match="two places"):
+        follow(steady(layout()), [torch.zeros(1, 2)], 1.0)
 
 
 @pytest.mark.parametrize(

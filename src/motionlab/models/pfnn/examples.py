@@ -19,8 +19,8 @@ from ...feet import contacts, strides
 from ...kinematics import yaw_matrix
 from ...metrics.gait import facing
 from ...motion import Motion
+from ...paths import flat, upright
 from .layout import Layout, join, size
-from .route import flat, upright
 from .walk import yaw_of
 
 _SMOOTH = 1 / 3  # seconds, deviation of the Gaussian that steadies the way a body faces

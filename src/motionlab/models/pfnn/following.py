@@ -11,9 +11,9 @@ from tqdm import tqdm
 
 from ...errors import ModelError
 from ...motion import Motion
+from ...paths import Curves, Path, flat, upright
 from .layout import GAITS
 from .network import Pfnn
-from .route import Routes
 from .walk import Frame, begin, lead, step
 
 _DOWN = 0.5  # a foot for which the network says more is in contact
@@ -51,7 +51,8 @@ def follow(
 
     Raises
     ------
-    ModelError : a path that is none, a speed or time not above 0, an unknown gait.
+    WayError : a path that is none.
+    ModelError : no list of paths, a speed or time not above 0, an unknown gait.
     """
     if isinstance(paths, Tensor) or not len(paths):
         raise ModelError("follow: paths must be a list, of one path or more: [points].")
@@ -60,17 +61,24 @@ def follow(
         raise ModelError(f"follow: seconds is {seconds!r}; it must be a number above 0.")
     gaits = _gaits(network, gait, speeds)
     beyond = float(speeds.max()) * ((seconds or 0.0) + 3 * its.reach / its.fps)
-    routes = Routes(paths, beyond)
-    ends = routes.lengths / speeds if seconds is None else torch.full_like(speeds, seconds)
+    ways = [Path.through(path, corner=0) for path in paths]
+    curves, which = Curves(ways, beyond), torch.arange(len(ways))
+    lengths = torch.tensor([way.length for way in ways])
+    ends = lengths / speeds if seconds is None else torch.full_like(speeds, seconds)
     counts = (ends * its.fps).round().long().clamp(min=1).tolist()
 
     ahead = torch.arange(1, its.reach) * (speeds[:, None] / its.fps)
-    along = torch.zeros_like(speeds)
-    start, facing = routes.at(along[:, None])
+    along = torch.zeros_like(lengths)
+
+    def led(arcs: Tensor) -> tuple[Tensor, Tensor]:
+        there = curves.at(arcs, which), curves.ways(arcs, which)
+        return tuple(upright(part).to(ahead) for part in there)
+
+    start, facing = led(along[:, None])
     walk, frames = begin(network, start[:, 0], facing[:, 0]), []
     for _ in tqdm(range(max(counts)), "walking", unit="frame", leave=False, delay=2):
-        along = routes.nearest(walk.root[0], along)
-        walk = lead(walk, *routes.at(along[:, None] + ahead))
+        along = curves.onward(flat(walk.root[0]), along, which)
+        walk = lead(walk, *led(along[:, None] + ahead))
         frame, walk = step(network, walk, gaits)
         frames.append(frame)
     shown = Frame(*(torch.stack(parts, dim=1) for parts in zip(*frames, strict=True)))

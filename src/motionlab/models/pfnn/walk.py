@@ -15,9 +15,9 @@ from torch import Tensor
 
 from ...encodings.path import turned
 from ...kinematics import yaw_matrix
+from ...paths import flat, upright
 from .layout import join, split
 from .network import Pfnn
-from .route import flat, upright
 
 _BLEND = 0.5  # share of the predicted joints; the rest are the old ones, moved by their velocities
 

@@ -8,9 +8,9 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionlab.errors import SolverError
+from motionlab.errors import WayError
 from motionlab.metrics import root_path_error
-from motionlab.solvers.paths import CHANGE, SIDEWAYS, Curves, Path, Piece
+from motionlab.paths import CHANGE, SIDEWAYS, Curves, Path, Piece, flat, upright
 
 SQUARE = [[0, 0], [3, 0], [3, 3], [0, 3], [0, 0]]
 
@@ -94,6 +94,42 @@ def test_paths_of_any_length_lie_side_by_side_and_go_on_straight():
     torch.testing.assert_close(found, expected, atol=1e-6, rtol=0)
 
 
+CORNERED = Path.through([[0, 0], [0, 2], [3, 2]], corner=0)
+
+
+def test_ways_lead_from_corner_to_corner_and_on():
+    curves, arcs = Curves([CORNERED], beyond=1.0), torch.tensor([[0.0, 0.5, 3, 5, 5.75]])
+    which = torch.tensor([0])
+    wanted = torch.tensor([[0, 0], [0, 0.5], [1, 2], [3, 2], [3.75, 2]]).double()
+    torch.testing.assert_close(curves.at(arcs, which)[0], wanted, atol=0.01, rtol=0)
+    wanted = torch.tensor([[0, 1], [0, 1], [1, 0], [1, 0], [1, 0]]).double()
+    torch.testing.assert_close(curves.ways(arcs, which)[0], wanted, atol=1e-5, rtol=0)
+
+
+@given(st.floats(0.0, 5.0), st.floats(-0.15, 0.15))
+@settings(max_examples=40, deadline=None)
+def test_who_is_on_a_way_is_found_there(along, off):
+    curves, which = Curves([CORNERED], beyond=1.0), torch.tensor([0])
+    arcs = torch.tensor([along], dtype=torch.double)
+    place = curves.at(arcs[:, None], which)[:, 0]
+    found = float(curves.onward(place, arcs + off, which))
+    assert found == pytest.approx(along, abs=0.02)
+
+
+def test_who_crosses_the_own_way_goes_on_along_it():
+    angle = np.linspace(0, 2 * math.pi, 500)
+    path = Path.through(np.stack([np.sin(2 * angle), 2 * np.sin(angle)], 1), corner=0)
+    curves, half = Curves([path, path]), path.length / 2
+    was = torch.tensor([0.1, half - 0.1], dtype=torch.double)
+    found = curves.onward(torch.zeros(2, 2), was, torch.tensor([0, 1]))
+    assert found.tolist() == pytest.approx([0, half], abs=0.01)
+
+
+def test_flat_places_lie_on_the_ground():
+    place = torch.tensor([1.0, 2.0])
+    assert upright(place).tolist() == [1, 0, 2] and torch.equal(flat(upright(place)), place)
+
+
 # -- timetables -----------------------------------------------------------------------------------
 
 
@@ -143,7 +179,7 @@ BAD = [
 
 @pytest.mark.parametrize(("points", "options", "said"), BAD, ids=lambda v: str(v)[:24])
 def test_what_is_no_way_is_told(points, options, said):
-    with pytest.raises(SolverError) as error:
+    with pytest.raises(WayError) as error:
         Path.through(points, **options)
     assert said in str(error.value)
 

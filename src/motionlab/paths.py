@@ -1,5 +1,8 @@
 """Ways over the ground: what is drawn becomes a curve one can walk, evenly spaced, with a timetable.
 
+A curve is known by its length: where one is after so many metres, which way it leads there, and how
+many metres lie behind somebody who is near it. Who solves for motion and who is led ask the same.
+
 way = Path.through([[0, 0], [3, 0], [3, 3]])            # corners in metres, x and z
 way = Path.through(places, spline=True)                 # a smooth curve through them
 way = Path.through(places, times=[0, 2, 5])             # to be there at these seconds
@@ -16,12 +19,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..errors import SolverError
+from .errors import WayError
 
 SPACING = 0.03  # m between the places of a curve
 CORNER = 0.4  # m, radius to which corners are rounded, at least
 LEAST = 0.1  # m: a shorter path is none
 BEYOND = 8.0  # m that a curve goes on straight, at both ends
+BACK, ON = 0.2, 0.5  # m of path in which one is sought who moves along it
 SIDEWAYS = 2.5  # m/s²: people slow down where a curve would push them harder
 SLOWEST, CHANGE = 0.4, 1.0  # m/s that even a hairpin is walked at; m/s² of slowing down for it
 LONGEST = 5_000.0  # m
@@ -105,16 +109,16 @@ class Path:
 
         Raises
         ------
-        SolverError : no such points, a NaN, no length or an absurd one, or times that stand still or
+        WayError : no such points, a NaN, no length or an absurd one, or times that stand still or
             go back.
         """
         points = _points(points)
         if not 0 <= corner < math.inf:
-            raise SolverError(f"corner is {corner!r}; it must be metres, 0 or more.")
+            raise WayError(f"corner is {corner!r}; it must be metres, 0 or more.")
         times = None if times is None else _times(times, len(points))
         new = np.r_[True, np.any(np.diff(points, axis=0) != 0, axis=1)]
         if not new[1:].any():
-            raise SolverError(
+            raise WayError(
                 f"A path needs two places that differ; {len(points)} given, all at "
                 f"({points[0, 0]:g}, {points[0, 1]:g})."
             )
@@ -122,7 +126,7 @@ class Path:
         curve = _even(_spline(drawn) if spline and len(drawn) > 2 else drawn)
         length = float(_arcs(curve)[-1])
         if not LEAST <= length <= LONGEST:
-            raise SolverError(
+            raise WayError(
                 f"A path of {length:.3g} m; it must be {LEAST:g} to {LONGEST:g} m long. Are the "
                 "numbers metres?"
             )
@@ -175,11 +179,14 @@ class Path:
 
 
 class Curves:
-    """Paths side by side, each going on straight at both ends; arcs count from where each begins."""
+    """Paths side by side, each going on straight at both ends; arcs count from where each begins.
 
-    def __init__(self, paths: Sequence[Path]) -> None:
+    beyond : metres that they go on at least.
+    """
+
+    def __init__(self, paths: Sequence[Path], beyond: float = BEYOND) -> None:
         longest = max(len(path.places) for path in paths)
-        more = math.ceil(BEYOND / SPACING)
+        more = math.ceil(beyond / min(path.length / (len(path.places) - 1) for path in paths))
         self.spacings, rows = [], []
         for path in paths:
             places = path.places
@@ -193,11 +200,28 @@ class Curves:
 
     def at(self, arcs: Tensor, which: Tensor) -> Tensor:
         """Places (batch, k, 2) at arcs (batch, k) metres of path `which` (batch,)."""
+        here, there, share = self._about(arcs, which)
+        return (1 - share) * here + share * there
+
+    def ways(self, arcs: Tensor, which: Tensor) -> Tensor:
+        """Which way (batch, k, 2), of length 1, the paths lead there; arguments as of `at`."""
+        here, there, _ = self._about(arcs, which)
+        return torch.nn.functional.normalize(there - here, dim=-1)
+
+    def _about(self, arcs: Tensor, which: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """The places before and behind arcs, and the share of the way between them."""
         steps = arcs.double() / self.spacing[which] + self.before
         steps = steps.clamp(0, self.places.shape[1] - 1.001)
         low, rows = steps.floor().long(), which[:, None]
-        share = (steps - low)[..., None]
-        return (1 - share) * self.places[rows, low] + share * self.places[rows, low + 1]
+        return self.places[rows, low], self.places[rows, low + 1], (steps - low)[..., None]
+
+    def onward(self, places: Tensor, arcs: Tensor, which: Tensor) -> Tensor:
+        """Metres of path (batch,) behind who is at places (batch, 2) and was at arcs (batch,).
+
+        Who crosses his own way goes on along it, and does not take the other branch.
+        """
+        near = self.piece(arcs - BACK, arcs + ON, which)
+        return near.nearest(places[:, None]).arcs[:, 0]
 
     def piece(self, first: Tensor, last: Tensor, which: Tensor) -> Piece:
         """The stretches from first to last (batch,) metres, at most 5 cm from place to place."""
@@ -207,6 +231,20 @@ class Curves:
         return Piece(self.at(arcs, which), arcs)
 
 
+# -- on the ground and above it ------------------------------------------------------------------
+
+
+def upright(pairs: Tensor) -> Tensor:
+    """Places (..., 3) on the ground of x and z (..., 2)."""
+    x, z = pairs.unbind(-1)
+    return torch.stack([x, torch.zeros_like(x), z], dim=-1)
+
+
+def flat(places: Tensor) -> Tensor:
+    """x and z (..., 2) of places (..., 3)."""
+    return places[..., [0, 2]]
+
+
 # -- what is given --------------------------------------------------------------------------------
 
 
@@ -214,15 +252,15 @@ def _points(points: Tensor | Sequence) -> np.ndarray:
     try:
         points = np.asarray(points, dtype=np.float64).copy()
     except (TypeError, ValueError, RuntimeError) as error:
-        raise SolverError(f"A path must be an array (n, 2) of numbers: {error}.") from error
+        raise WayError(f"A path must be an array (n, 2) of numbers: {error}.") from error
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
-        raise SolverError(
+        raise WayError(
             f"A path of shape {points.shape}; it must be (n, 2), x and z in metres of at least two "
             "places. A single place leads nowhere."
         )
     if not np.isfinite(points).all():
         bad = int((~np.isfinite(points)).any(1).argmax())
-        raise SolverError(f"Place {bad + 1} of the path is {points[bad].tolist()}; leave it out.")
+        raise WayError(f"Place {bad + 1} of the path is {points[bad].tolist()}; leave it out.")
     return points
 
 
@@ -230,12 +268,12 @@ def _times(times: Tensor | Sequence, count: int) -> np.ndarray:
     try:
         times = np.asarray(times, dtype=np.float64)
     except (TypeError, ValueError, RuntimeError) as error:
-        raise SolverError(f"times must be an array (n,) of seconds: {error}.") from error
+        raise WayError(f"times must be an array (n,) of seconds: {error}.") from error
     if times.shape != (count,) or not np.isfinite(times).all():
-        raise SolverError(f"times of shape {times.shape} for {count} places; one each, no NaN.")
+        raise WayError(f"times of shape {times.shape} for {count} places; one each, no NaN.")
     if (steps := np.diff(times)).min() <= 0:
         i = int((steps <= 0).argmax())
-        raise SolverError(
+        raise WayError(
             f"Place {i + 2} has time {times[i + 1]:g} s and the one before it {times[i]:g} s; times "
             "must rise."
         )
