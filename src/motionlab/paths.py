@@ -57,20 +57,29 @@ class Piece(NamedTuple):
         point: so the slope of a squared distance is right with the place held fast.
         """
         with torch.no_grad():
-            begin, along = self.places[:, None, :-1].to(points), self.places.diff(dim=1)[:, None]
-            along = along.to(points)
-            length = along.square().sum(-1).clamp(min=1e-12)  # (batch, 1, n - 1)
-            gap = points[:, :, None] - begin
-            part = ((gap * along).sum(-1) / length).clamp(0, 1)
-            which = (gap - part[..., None] * along).square().sum(-1).argmin(-1)  # (batch, k)
-            rows = torch.arange(len(points), device=points.device)[:, None]
-            begin, along = begin[rows, 0, which], along[rows, 0, which]
-            share = part.gather(2, which[..., None])[..., 0]
-            places = begin + share[..., None] * along
-            ways = self.arcs.diff(dim=1).to(points)[rows, which]
-            arcs = self.arcs.to(points)[rows, which] + share * ways
+            # on one of the two lines that meet in the nearest of the given places
+            apart = points[:, :, None].detach() - self.places[:, None].to(points)
+            corner = apart.square().sum(-1).argmin(-1)  # (batch, k)
+            which = torch.stack([corner - 1, corner], -1).clamp(0, self.places.shape[1] - 2)
+            rows = torch.arange(len(points), device=points.device)[:, None, None]
+            begin, end = (self.places[rows, which + i].to(points) for i in (0, 1))
+            along, gap = end - begin, points[:, :, None].detach() - begin  # (batch, k, 2, 2)
+            length = along.square().sum(-1).clamp(min=1e-12)
+            share = ((gap * along).sum(-1) / length).clamp(0, 1)
+            second = (gap - share[..., None] * along).square().sum(-1).argmin(-1, keepdim=True)
+            which, share, length = (
+                part.gather(2, second)[..., 0] for part in (which, share, length)
+            )
+            begin, along = (
+                part.gather(2, second[..., None].expand(-1, -1, 1, 2))[:, :, 0]
+                for part in (begin, along)
+            )
+            places, rows = begin + share[..., None] * along, rows[..., 0]
+            before = self.arcs[rows, which]
+            ways = (self.arcs[rows, which + 1] - before).to(points)
+            arcs = before.to(points) + share * ways
             free = (share > 0) & (share < 1)  # a corner stays the nearest for a while
-            slope = along * (free * ways / along.square().sum(-1).clamp(min=1e-12))[..., None]
+            slope = along * (free * ways / length)[..., None]
         moved = points - points.detach()
         return Near(places, arcs + (moved * slope).sum(-1))
 

@@ -30,6 +30,19 @@ def small(motion: Motion) -> Motion:
     return replace(motion, skeleton=skeleton, rotations=motion.rotations[:, joints])
 
 
+@pytest.mark.parametrize("points", [[], [0], [16, 20], [3, 24, 5], range(26)])
+def test_some_points_are_those_of_the_whole_body(gait, points):
+    encoding = JointAngles(gait.skeleton)
+    features, start = encoding.encode(gait)[:9].unflatten(0, (3, 3)), (1.0, 2.0, 3.0)
+    found = encoding.positions(features, start, points)
+    whole = encoding.positions(features, start)
+    assert found.shape == whole.shape
+    torch.testing.assert_close(found[..., [*points], :], whole[..., [*points], :])
+    known = found.isfinite().all(-1).flatten(0, 1)
+    assert bool(known[:, [*points]].all()) and bool((known == known[0]).all())
+    assert known[0].all() == (len(points) == 26)
+
+
 @pytest.mark.parametrize("special", ["random", "zero", "facing backwards"])
 def test_gradients_against_finite_differences(make, wild, special):
     motion = small(wild(2, special, frames=3))

@@ -74,6 +74,34 @@ def test_log_prob_by_hand():
     assert mix.log_prob(value).item() == pytest.approx(math.log(total))
 
 
+def test_log_prob_has_the_slopes_of_torch_distributions():
+    mix, values = mixture(3, 2), torch.randn(3, 2, 4, dtype=torch.float64)
+    values[0] = mix.means[0, :, 0]  # others are far away
+    found = []
+    for density in (lambda mix: mix, in_torch):
+        parts = [part.detach().clone().requires_grad_() for part in (values, *mix)]
+        total = density(Mixture(*parts[1:])).log_prob(parts[0])
+        slopes = torch.autograd.grad((total * torch.arange(6).view(3, 2)).sum(), parts)
+        weights = slopes[1]  # as torch sees them: only their differences count
+        found.append(
+            (total, slopes[0], *slopes[2:], weights - weights.sum(-1, True) * mix[0].exp())
+        )
+    for ours, theirs in zip(*found, strict=True):
+        torch.testing.assert_close(ours, theirs)
+
+
+def test_no_slope_is_a_number_that_processors_stumble_over():
+    means = torch.tensor([[0.0], [14.0]])
+    value = torch.zeros(1, requires_grad=True)
+    parts = [torch.zeros(2), means.requires_grad_(), torch.ones(2, 1)]
+    Mixture(*parts).log_prob(value).backward()
+    assert means.grad[1] == 0 and means.grad[0] == 0
+    tiny = torch.finfo(torch.float32).tiny
+    value = torch.full((1,), 0.5, requires_grad=True)
+    Mixture(*parts).log_prob(value).backward()
+    assert (means.grad == 0).logical_or(means.grad.abs() > tiny).all()
+
+
 def test_log_prob_of_what_is_far_away_stays_finite():
     mix = mixture(70, kept=70, dtype=torch.float32)
     values = torch.full((70, 70), 1e4, requires_grad=True)

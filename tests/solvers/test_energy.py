@@ -109,6 +109,15 @@ def test_slopes_are_those_of_differences(network, window, wishes, name):
             torch.testing.assert_close(found, expected, rtol=2e-5, atol=1e-4)
 
 
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("prior", "noise")])
+def test_a_term_looks_at_no_other_points_than_it_says(network, window, wishes, name):
+    """What it does not look at is NaN for it, if it is alone."""
+    before, s, d = window
+    alone = Energy(network, before, {name: wishes[name]}).parts(s, d)[name]
+    among = Energy(network, before, wishes | {"all": lambda *rows: rows[0].new_ones(2)})
+    torch.testing.assert_close(alone, among.parts(s, d)[name], rtol=1e-9, atol=1e-12)
+
+
 def test_slope_in_d_runs_through_the_recurrence(network, window):
     """What disturbs the first frame matters to all that follow it; the last, to nothing here."""
     before, s, d = window

@@ -47,7 +47,7 @@ class Design(Rig):
     """Hold toes still while they are in contact."""
     seed: int = 0
     """Start of all chance."""
-    steps: int = 40
+    steps: int = 25
     """Steps of the search in each window; fewer are faster and farther from the path."""
     skeleton: Annotated[str | None, arg(metavar="RIG|canonical")] = None
     """Bring the motion to this rig: a file in which a person stands, at rest or in a frame."""

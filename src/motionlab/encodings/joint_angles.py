@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import roma
 import torch
 from torch import Tensor
@@ -19,6 +21,7 @@ from .base import (
     skeleton_config,
 )
 from .effectors import body_points, effector_joints, moving
+from .limbs import Limbs
 from .mean_pose import check_pose, mean_pose_of
 from .path import Start, read_start, steps_between, walk
 from .rotations import WIDTHS, euler_matrix, from_numbers, to_numbers
@@ -133,15 +136,29 @@ class JointAngles:
 
     # -- features to motion -----------------------------------------------------------------------
 
-    def positions(self, features: Tensor, start: Start | None = None) -> Tensor:
-        """Points (..., frames, points, 3); see `Encoding.positions`."""
-        root_positions, rotations = self.rotations(features, start)
-        return body_points(self.skeleton, rotations, root_positions)
+    def positions(
+        self, features: Tensor, start: Start | None = None, points: Iterable[int] | None = None
+    ) -> Tensor:
+        """Points (..., frames, points, 3); see `Encoding.positions`.
 
-    def rotations(self, features: Tensor, start: Start | None = None) -> tuple[Tensor, Tensor]:
-        """Root positions (..., frames, 3) and local rotations (..., frames, joints, 3, 3)."""
+        points : those that somebody will look at. The others come out as NaN: of a whole body, feet
+        are a third of the work, and the root's way none.
+        """
+        if points is None:
+            root_positions, rotations = self.rotations(features, start)
+            return body_points(self.skeleton, rotations, root_positions)
+        limbs = Limbs.to(self.skeleton, points)
+        return limbs.points(*self.rotations(features, start, limbs.joints))
+
+    def rotations(
+        self, features: Tensor, start: Start | None = None, joints: Sequence[int] | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """Root positions (..., frames, 3) and local rotations (..., frames, joints, 3, 3).
+
+        joints : whose rotations, the root, 0, first; None: all.
+        """
         features = check_features(self, features)
-        tilt, joints = self._turns(features)
+        tilt, joints = self._turns(features, joints)
         place, yaw = self._way(features, start)
         root = torch.einsum("...ab,...bc->...ac", yaw_matrix(yaw), tilt)
         return place, torch.cat([root[..., None, :, :], joints], dim=-3)
@@ -188,15 +205,21 @@ class JointAngles:
         features = check_features(self, features)
         return features[..., self.slices["contacts"]] if "contacts" in self.slices else None
 
-    def _turns(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """Tilt (..., frames, 3, 3) of the root and rotations of the other joints."""
+    def _turns(
+        self, features: Tensor, joints: Sequence[int] | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """Tilt (..., frames, 3, 3) of the root and rotations of the other joints, or some of them."""
         x, z = features[..., 4], features[..., 5]
         if self.rotation == "euler":
             tilt = euler_matrix(features[..., 4:6], "XZ")
         else:
             tilt = roma.rotvec_to_rotmat(torch.stack([x, torch.zeros_like(x), z], dim=-1))
         pose = features[..., self.slices["pose"]].unflatten(-1, (-1, WIDTHS[self.rotation]))
-        return tilt, from_numbers(pose, self.rotation, self.mean_pose[1:], self._orders)
+        mean, orders = self.mean_pose[1:], self._orders
+        if joints is not None:
+            some = [joint - 1 for joint in joints[1:]]
+            pose, mean, orders = pose[..., some, :], mean[some], [orders[i] for i in some]
+        return tilt, from_numbers(pose, self.rotation, mean, orders)
 
     # -- settings ---------------------------------------------------------------------------------
 

@@ -20,11 +20,13 @@ from .noise import noise_to_draw, normal
 from .recurrent import Recurrent
 from .sampler import PRECISIONS, Chance, choose, unroll
 from .state import State
+from .through import through
 
 # Smallest standard deviations, in normalised units. A contact is 0 or 1: a Gaussian around such a
 # value could be made as narrow, and its density as high, as one likes. With 0.1 a contact that the
 # network was sure of and got wrong costs about 200 nats.
 _FLOOR, _CONTACT_FLOOR = 0.01, 0.1
+_NO_SHARE = 1e-12  # a component's part in a density, below which it has none in its slope
 
 
 class Mixture(NamedTuple):
@@ -39,9 +41,8 @@ class Mixture(NamedTuple):
 
         The sum over components is a log-sum-exp: densities of 70 channels under- and overflow.
         """
-        far = (values[..., None, :] - self.means) / self.stds  # (..., M, kept)
-        each = -(far.square() / 2 + self.stds.log() + math.log(2 * math.pi) / 2).sum(-1)  # (..., M)
-        return (self.log_weights + each).logsumexp(-1)
+        values, means, stds = torch.broadcast_tensors(values[..., None, :], self.means, self.stds)
+        return _LogProb.apply(values, self.log_weights.expand(means.shape[:-1]), means, stds)
 
     def sample(
         self,
@@ -68,6 +69,30 @@ class Mixture(NamedTuple):
         chosen = choose(self.log_weights / component_temperature, generator)  # (...)
         chosen = chosen[..., None, None].expand(*chosen.shape, 1, self.means.shape[-1])
         return self.means.gather(-2, chosen)[..., 0, :], self.stds.gather(-2, chosen)[..., 0, :]
+
+
+class _LogProb(torch.autograd.Function):
+    """Its slope is written out for one reason: components that are far away have none.
+
+    Theirs would be a number so small that processors take a hundred times as long to multiply it.
+    """
+
+    @staticmethod
+    def forward(ctx, values, log_weights, means, stds):
+        far = (values - means) / stds  # (..., M, kept)
+        each = -(far.square() / 2 + stds.log() + math.log(2 * math.pi) / 2).sum(-1)  # (..., M)
+        joint = log_weights + each
+        total = joint.logsumexp(-1)
+        ctx.save_for_backward(far, stds, (joint - total[..., None]).exp())
+        return total
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx, slope):
+        far, stds, shares = ctx.saved_tensors
+        shares = slope[..., None] * shares.masked_fill(shares < _NO_SHARE, 0)
+        to_means = shares[..., None] * far / stds
+        return -to_means, shares, to_means, to_means * far - shares[..., None] / stds
 
 
 class LstmGmm(Recurrent):
@@ -166,9 +191,14 @@ class LstmGmm(Recurrent):
             state.hidden.transpose(0, 1).contiguous(),
             state.cell.transpose(0, 1).contiguous(),
         )
-        outputs, (hidden, cell) = self.lstm(self.enter(inputs), memory)  # (batch, frames, width)
+        if torch.is_grad_enabled() and not any(w.requires_grad for w in self.lstm.parameters()):
+            frames_first = inputs.transpose(0, 1).contiguous()
+            outputs, hidden, cell = through(self.lstm, self.enter(frames_first), *memory)
+            outputs = outputs.transpose(0, 1).contiguous()
+        else:
+            outputs, (hidden, cell) = self.lstm(self.enter(inputs), memory)
         after = State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1), state.noise)
-        return self._mixture(outputs, inputs), after
+        return self._mixture(outputs, inputs), after  # outputs (batch, frames, width)
 
     def _mixture(self, outputs: Tensor, inputs: Tensor) -> Mixture:
         """Numbers of any size (..., width) to weights, means and deviations (eq. 7).

@@ -12,18 +12,25 @@ frames before it, by s and d, and so does its gradient (BPTT).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
+from ..encodings import JointAngles
 from ..errors import SolverError
 from ..models import LstmGmm, Mixture, State
 from .terms import Term
 
 NOISE = 0.05  # σ of d in normalised units, the paper's and the training's
 OWN = ("prior", "noise")
+
+
+def _looked_at(terms: Iterable[Term]) -> frozenset[int] | None:
+    """The points that terms look at; None, all of them, if one does not say."""
+    each = [getattr(term, "points", None) for term in terms]
+    return None if None in each else frozenset().union(*each)
 
 
 class Before(NamedTuple):
@@ -100,7 +107,7 @@ class Energy:
         if wanted("noise"):
             found["noise"] = (d / NOISE).square().flatten(1).sum(1) / 2
         if terms := {name: term for name, term in self.terms.items() if wanted(name)}:
-            rows = self.decoded(features)
+            rows = self.decoded(features, _looked_at(terms.values()))
             found |= {name: term(*rows) for name, term in terms.items()}
         return {name: self.weights.get(name, 1.0) * value for name, value in found.items()}
 
@@ -112,10 +119,16 @@ class Energy:
         rest, _ = self.model.read(features[:, :-1], self.before.state, d[:, :-1])
         return Mixture(*(torch.cat([a[:, None], b], 1) for a, b in zip(first, rest, strict=True)))
 
-    def decoded(self, features: Tensor) -> tuple[Tensor, Tensor, Tensor | None]:
-        """What a term gets: features, positions and contacts, with the frame before as row 0."""
+    def decoded(
+        self, features: Tensor, points: frozenset[int] | None = None
+    ) -> tuple[Tensor, Tensor, Tensor | None]:
+        """What a term gets: features, positions and contacts, with the frame before as row 0.
+
+        points : those that will be looked at; the others may be NaN. None: all.
+        """
         encoding = self.model.encoding
         features = torch.cat([self.before.frame[:, None], features], dim=1)
-        positions = encoding.positions(features, self.before.place)
+        some = {"points": points} if isinstance(encoding, JointAngles) else {}
+        positions = encoding.positions(features, self.before.place, **some)
         has = "contacts" in encoding.slices
         return features, positions, encoding.contacts(features) if has else None

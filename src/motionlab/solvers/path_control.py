@@ -31,7 +31,7 @@ from .guided import Steering, guided
 from .window import METHODS, Solved, solve
 
 WINDOW, OVERLAP = 34, 17  # frames, the paper's
-CANDIDATES, STEPS = 4, 40
+CANDIDATES, STEPS = 4, 25
 LONGER, ROUGH = 2, 0.012  # times; m, root mean square from the path in a window
 RETRIES = 2
 ASTRAY = 0.10  # m, root mean square from the path in a window: that is no following

@@ -9,7 +9,8 @@ here make such functions from what is wished. A term gets
 * contacts (batch, 1 + frames, 2 or 4) from 0 to 1, or None if the model has none.
 
 Row 0 of each is the frame before the window, which stands fast: speeds and slides of the first frame
-are seen from there. Whatever follows this contract is a term, wherever it stands.
+are seen from there. Whatever follows this contract is a term, wherever it stands. A term that looks at
+some points only may say so by an attribute `points`: what nobody looks at is NaN, and costs nothing.
 
 The paper leaves out the 2 of a Gaussian's denominator in (18), (19), (23) and (24), and has it in
 (17) and (26); here every σ is a standard deviation. Their defaults are told in the book under *Assumptions and
@@ -43,6 +44,16 @@ ROOT, ANGLE = 0.02, 0.08  # m, rad: the weaker noise that denoising is tried on
 _GROUND = [0, 2]
 
 
+def _looking_at(*points: int) -> Callable[[Term], Term]:
+    """Says of a term which points of the body it looks at."""
+
+    def said(term: Term) -> Term:
+        term.points = frozenset(points)
+        return term
+
+    return said
+
+
 def path(piece: Piece, point: int = 0, std: float = PATH) -> Term:
     """A point of the body is above a path at all times (eq. 18), wherever on it.
 
@@ -53,6 +64,7 @@ def path(piece: Piece, point: int = 0, std: float = PATH) -> Term:
     std : σ_fit in metres.
     """
 
+    @_looking_at(point)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         places = positions[:, 1:, point, _GROUND]
         return _gaussian(places - piece.nearest(places).places, std)
@@ -63,6 +75,7 @@ def path(piece: Piece, point: int = 0, std: float = PATH) -> Term:
 def time(piece: Piece, arcs: Tensor, point: int = 0, std: float = TIME) -> Term:
     """... and on it in time: arcs (batch, frames), metres of path that should lie behind it."""
 
+    @_looking_at(point)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         there = piece.nearest(positions[:, 1:, point, _GROUND]).arcs
         return _gaussian(there - arcs.to(there), std)
@@ -79,6 +92,7 @@ def ahead(
     the paper's.
     """
 
+    @_looking_at(0)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         places = positions[:, :, 0, _GROUND]
         some = min(frames, places.shape[1] - 1)
@@ -92,6 +106,7 @@ def ahead(
 def speed(wanted: Tensor | float, fps: float, std: float = SPEED) -> Term:
     """The root's mean speed over the ground in the window is `wanted` (batch,) m/s (eq. 23)."""
 
+    @_looking_at(0)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         moves = positions[:, :, 0, _GROUND].diff(dim=1)
         moved = moves.square().sum(-1).clamp(min=1e-12).sqrt()  # standing has a slope, too
@@ -116,6 +131,7 @@ def turn(wanted: Tensor | float, std: float = FACING) -> Term:
     Of features whose third channel is the root's turn from frame to frame, as of `JointAngles`.
     """
 
+    @_looking_at()
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         return _gaussian((features[:, 1:, 2].sum(1) - wanted)[:, None], std)
 
@@ -126,6 +142,7 @@ def step_length(wanted: Tensor | float, skeleton: Skeleton, std: float = STEP) -
     """Wherever a toe sets down, it does so `wanted` (batch,) metres from the other one."""
     toes = [foot_points(skeleton)[channel] for channel in (1, 3)]
 
+    @_looking_at(*toes)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         down = _toes(contacts)
         strikes = (down[:, 1:] & ~down[:, :-1]).any(-1)  # (batch, frames)
@@ -146,6 +163,7 @@ def contact(skeleton: Skeleton, slide: float = SLIDE, height: float = HEIGHT) ->
     toes = [foot_points(skeleton)[channel] for channel in (1, 3)]
     low = rest_heights(skeleton)[[1, 3]]
 
+    @_looking_at(*toes)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         down, feet = _toes(contacts), positions[:, :, toes]
         held = down[:, 1:] & down[:, :-1]
@@ -164,6 +182,7 @@ def resting(skeleton: Skeleton, fps: float, slide: float = SLIDE, slower: float 
     """
     feet = foot_points(skeleton)
 
+    @_looking_at(*feet)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         moves = positions[:, :, feet].diff(dim=1)  # (batch, frames, 4, 3)
         slow = (moves.detach().norm(dim=-1) * fps < slower)[..., None]
@@ -185,6 +204,7 @@ def places(
     std : σ_root in metres.
     """
 
+    @_looking_at(*points)
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         return _seen(
             positions[:, 1:, points], wanted, None if mask is None else mask[..., None], std
@@ -206,6 +226,7 @@ def channels(
     std : σ_angle in the features' units, one or one a channel.
     """
 
+    @_looking_at()
     def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
         return _seen(features[:, 1:, which], wanted, mask, std)
 

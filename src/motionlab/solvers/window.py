@@ -2,16 +2,20 @@
 
 What is searched is whitened: each feature's change in units of its deviation in the component that
 the first guess came from, the disturbances in units of theirs. A root's step may change by millimetres
-and an elbow by degrees; in these units a step downhill is as long for the one as for the other.
+and an elbow by degrees; in these units a step downhill is as long for the one as for the other. And a
+change lasts: the frames behind it keep a share of it, as they do when the network itself is pushed
+(its means hold on to the frame before). A root's lean into a bend is one number then, not thirty that
+must agree.
 
-Adam is what is used, with long steps: at a rate of 0.08 sixty of them left a root 2.9 cm from its path
-and two hundred 0.8 cm; at 0.4 sixty leave 0.5 cm, and the motion is as likely. L-BFGS, the paper's, is
+Adam is what is used, with steps as long as a deviation and a short memory: it comes as low as with
+its usual settings, frame by frame, in a fifth of the steps (``benchmarks/bench_design.py``). L-BFGS, the paper's, is
 there to compare: windows of a batch must share its step lengths. So is the swarm, the paper's
 beginning: it sees little in four thousand dimensions.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import torch
@@ -22,7 +26,9 @@ from .energy import NOISE, Energy
 from .swarm import swarm
 
 METHODS = ("adam", "lbfgs", "swarm", "none")
-RATE = 0.4  # of Adam, in deviations; falls to a tenth over the second half
+RATE = 1.0  # of Adam, in deviations; falls to a tenth over the second half
+PUSH, SQUARE = 0.5, 0.8  # what Adam keeps of its averages of slopes and of their squares, a step
+LASTS = 0.7  # of a change in a frame, in the next
 FARTHEST = 8.0  # deviations from the first guess: what goes farther has diverged
 
 
@@ -68,6 +74,9 @@ class _Search:
         with torch.no_grad():
             features = energy.model.normalizer.inverse(s)
             self.scale = spread(energy.mixture(features, d), s)
+        frames = torch.arange(s.shape[1], device=s.device)
+        later = (frames[:, None] - frames).to(s)
+        self.lasting = math.sqrt(1 - LASTS**2) * LASTS ** later.clamp(min=0) * (later >= 0)
         self.best = self.zero()
         self.least = s.new_full((len(s),), torch.inf)
         self.evaluations = 0
@@ -79,7 +88,8 @@ class _Search:
         """s and d that free numbers stand for."""
         free = free.clamp(-FARTHEST, FARTHEST)
         u, v = free.split([self.s[0].numel(), self.d[0].numel()], 1)
-        return self.s + self.scale * u.view_as(self.s), self.d + NOISE * v.view_as(self.d)
+        s = self.s + self.lasting @ (self.scale * u.view_as(self.s))
+        return s, self.d + NOISE * v.view_as(self.d)
 
     def look(self, free: Tensor) -> Tensor:
         """Energies (batch,) there."""
@@ -113,10 +123,10 @@ def _adam(search: _Search, free: Tensor, steps: int) -> None:
     first, second = torch.zeros_like(free), torch.zeros_like(free)
     for t in range(1, steps + 1):
         _, slope = search.slope(free)
-        first = 0.9 * first + 0.1 * slope
-        second = 0.99 * second + 0.01 * slope.square()
+        first = torch.lerp(slope, first, PUSH)
+        second = torch.lerp(slope.square(), second, SQUARE)
         rate = RATE * min(1.0, 0.1 + 1.8 * (1 - t / steps))
-        step = first / (1 - 0.9**t) / ((second / (1 - 0.99**t)).sqrt() + 1e-8)
+        step = first / (1 - PUSH**t) / ((second / (1 - SQUARE**t)).sqrt() + 1e-8)
         free = (free - rate * step).clamp(-FARTHEST, FARTHEST)
     with torch.no_grad():
         search.look(free)
