@@ -52,6 +52,12 @@ def test_a_spline_leads_through_its_places():
     assert (near.arcs[0].diff() > 0.5).all()
 
 
+def test_who_walks_a_gentle_spline_is_on_the_line_that_was_drawn():
+    path = Path.through([[0, 0], [0, 3], [3, 6], [3, 9]], spline=True)
+    off = root_path_error(path.places[:, None, [0, 0, 1]], path.drawn)
+    assert float(off.rms) < 0.1  # cm
+
+
 @given(st.lists(st.tuples(*[st.floats(-4, 4)] * 2), min_size=1, max_size=5), st.floats(0.2, 3))
 @settings(max_examples=25, deadline=None)
 def test_nearest_is_no_farther_than_any_place(points, bend):

@@ -88,7 +88,8 @@ class Piece(NamedTuple):
 class Path:
     """A curve on the ground, in places evenly spaced, and when to be where.
 
-    drawn : (n, 2) metres, as it was given, without repeated places.
+    drawn : (n, 2) metres, the line as it was given, without repeated places; or the smooth curve
+        through what was given.
     places : (m, 2) metres, the curve that is to be walked: corners rounded.
     times : (k,) seconds and `behind` (k,) metres of path at them; None if only the speed is given.
     """
@@ -132,7 +133,8 @@ class Path:
                 f"({points[0, 0]:g}, {points[0, 1]:g})."
             )
         drawn = points[new]
-        curve = _even(_spline(drawn) if spline and len(drawn) > 2 else drawn)
+        drawn = _spline(drawn) if spline and len(drawn) > 2 else drawn
+        curve = _even(drawn)
         length = float(_arcs(curve)[-1])
         if not LEAST <= length <= LONGEST:
             raise WayError(
