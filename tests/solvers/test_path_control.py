@@ -8,12 +8,13 @@ from motionlab.errors import SolverError
 from motionlab.metrics import root_path_error
 from motionlab.models.sampler import Chance
 from motionlab.paths import Path
-from motionlab.solvers import path_control, terms
+from motionlab.solvers import path_control, terms, windows
 from motionlab.solvers.energy import Before
 from motionlab.solvers.path_control import follow
 from motionlab.solvers.run_up import pick_start, run_up
 
-QUICK = {"steps": 3, "candidates": 2, "fastest": 4.0, "window": 12, "overlap": 6}
+QUICK = {"steps": 3, "candidates": 2, "fastest": 4.0, "window": 12, "overlap": 6,
+         "retries": 0}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +27,7 @@ def walker():
 @pytest.fixture(autouse=True)
 def one_try(monkeypatch):
     """So small a network is always astray."""
-    monkeypatch.setattr(path_control, "RETRIES", 0)
-    monkeypatch.setattr(path_control, "LONGER", 0)
+    monkeypatch.setattr(windows, "LONGER", 0)
 
 
 def calm(seed=0):
@@ -77,10 +77,8 @@ def test_the_state_goes_on_exactly(walker):
     """Windows end, and the network knows all that it would know had it never been stopped."""
     before = beginning(walker, [STRAIGHT])
     table = STRAIGHT.timetable(1.2, 4.0, 30.0)
-    job = path_control._Job(
-        walker, [STRAIGHT], before, [path_control._Way(table, [before.frame])], 4.0,
-        path_control.wishes, {}, calm(), "none", 1, 1, 12, 6,
-    )  # fmt: skip
+    how = windows.Settings(4.0, path_control.wishes, {}, calm(), "none", 1, 1, True, 0, 12, 6)
+    job = windows.Job(walker, [STRAIGHT], before, [windows.Way(table, [before.frame])], how)
     for _ in range(2):
         job.go_on()
     frames = torch.cat(job.ways[0].frames)[None]
@@ -113,26 +111,81 @@ def test_who_never_arrives_stops_all_the_same(walker):
 
 
 def test_who_is_astray_begins_again_so_often_and_no_more(walker, monkeypatch):
-    monkeypatch.setattr(path_control, "ASTRAY", 0.0)
-    monkeypatch.setattr(path_control, "RETRIES", 2)
+    monkeypatch.setattr(windows, "ASTRAY", 0.0)
     table = STRAIGHT.timetable(1.2, 4.0, 30.0)
     (way,) = follow(
-        walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [table], chance=calm(), **QUICK
-    )
-    assert way.retries >= 2 and way.retries % path_control.RETRIES == 0
+        walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [table], chance=calm(),
+        **QUICK | {"retries": 2},
+    )  # fmt: skip
+    assert way.retries >= 2 and way.retries % 2 == 0
     assert way.features.isfinite().all()
 
 
 @pytest.mark.parametrize(("rough", "more"), [(0.0, True), (10.0, False)])
 def test_who_is_not_near_goes_on_searching(walker, before, monkeypatch, rough, more):
-    monkeypatch.setattr(path_control, "ROUGH", rough)
+    monkeypatch.setattr(windows, "ROUGH", rough)
     table = STRAIGHT.timetable(1.2, 4.0, 30.0)
     looked = []
     for longer in (0, 1):
-        monkeypatch.setattr(path_control, "LONGER", longer)
+        monkeypatch.setattr(windows, "LONGER", longer)
         (way,) = follow(walker, [STRAIGHT], before[[1]], [table], chance=calm(), **QUICK)
         looked.append(way.evaluations / len(way.features))
     assert (looked[1] > looked[0]) == more
+
+
+@pytest.mark.parametrize("timed", [False, True])
+def test_what_stands_fast_is_shown_window_by_window(walker, timed):
+    more = {"times": [0, 0.5, 1.1]} if timed else {}
+    paths = [Path.through([[0, 0], [0, 0.4], [0.2, 0.7]], **more), STRAIGHT]
+    shown = []
+    found = follow(
+        walker, paths, beginning(walker, paths), [p.timetable(1.2, 4.0, 30.0) for p in paths],
+        chance=calm(), watch=shown.append, **QUICK,
+    )  # fmt: skip
+    for number, way in enumerate(found):
+        news = [some for some in shown if some.path == number]
+        rows = [news[0].features[:1], *(some.features[1:] for some in news)]
+        assert torch.equal(torch.cat(rows), way.features)
+        done = [some.done for some in news]
+        assert done == sorted(done) and done[-1] == 1 and 0 < done[0] < 1
+        walked = walker.encoding.root_path(way.features, way.place)[:, [0, 2]].double()
+        frame = len(news[0].features) - 1
+        torch.testing.assert_close(news[1].place[:2], walked[frame], atol=1e-5, rtol=0)
+
+
+def test_who_watches_may_leave_off(walker):
+    shown = []
+
+    def watch(news):
+        shown.append(news)
+        if len(shown) == 2:
+            raise KeyboardInterrupt
+
+    (way,) = follow(
+        walker, [BENT], beginning(walker, [BENT]), [BENT.timetable(1.2, 4.0, 30.0)],
+        chance=calm(), watch=watch, **QUICK,
+    )  # fmt: skip
+    assert way.interrupted and len(way.features) == 1 + 12 + 6
+
+
+@pytest.mark.parametrize("name", path_control.BASELINES)
+def test_what_a_search_is_compared_with(walker, before, name):
+    few = {"steps": 2, "candidates": 2}
+    given = path_control.BASELINES[name]
+    found = both(walker, before, **given | {key: few[key] for key in few if key in given})
+    for way in found:
+        assert way.finished and way.features.isfinite().all() and way.retries == 0
+
+
+def test_free_samples_know_nothing_of_the_path(walker, before):
+    """Drawn by the same chance, they are the network's own, and the same on every path."""
+    frames = []
+    for path in (STRAIGHT, Path.through([[2, 1], [2.0, 1.5]])):
+        tables = [path.timetable(1.2, 4.0, 30.0)]
+        free = dict(method="none", guide=False, candidates=1, chance=calm())
+        (way,) = follow(walker, [path], before[[1]], tables, **QUICK | free)
+        frames.append(way.features[:10])
+    assert torch.equal(*frames)
 
 
 def test_interrupted_it_gives_what_it_has(walker):
@@ -161,7 +214,8 @@ def test_interrupted_it_gives_what_it_has(walker):
 @pytest.mark.parametrize(
     ("options", "said"),
     [({"method": "newton"}, "adam, lbfgs"), ({"steps": 0}, "at least 1"),
-     ({"overlap": 12}, "share"), ({"overlap": 0}, "share"), ({"candidates": 0}, "at least 1"),
+     ({"overlap": 12}, "share"), ({"overlap": 0}, "share"), ({"window": 1, "overlap": 1}, "share"),
+     ({"retries": -1}, "at least 1, 1 and 0"), ({"candidates": 0}, "at least 1"),
      ({"weights": {"way": 2.0}}, "the terms are")],
 )  # fmt: skip
 def test_settings_that_make_no_sense(walker, options, said):

@@ -50,6 +50,33 @@ def test_what_no_one_can_do_is_told_by_how_much_and_where(model):
         assert far == any("from the drawn line, at" in note for note in record["notes"])
 
 
+def test_what_is_watched_is_the_motion_where_it_stands(model):
+    shown, done = [], []
+
+    def watch(motion, share):
+        shown.append(motion)
+        done.append(share)
+
+    motion, _ = motionlab.design(CORNER, model=model, watch=watch, **QUICK)
+    points = torch.cat([some.positions() for some in shown])
+    torch.testing.assert_close(points, motion.positions(), atol=1e-4, rtol=0)
+    assert len(shown) > 1 and done == sorted(done) and done[-1] == 1
+    contacts = torch.cat([some.contacts for some in shown])
+    assert torch.equal(contacts, motion.contacts)
+    ways, numbers = [Path.through([[0, 0], [0, 0.5]]), Path.through(CORNER)], []
+    design_all(ways, model=model, watch=lambda number, *_: numbers.append(number), **QUICK)
+    assert set(numbers) == {0, 1} and numbers.count(1) > numbers.count(0)
+
+
+def test_who_watches_may_leave_off(model):
+    def watch(motion, share):
+        raise KeyboardInterrupt
+
+    motion, record = motionlab.design(CORNER, model=model, watch=watch, **QUICK)
+    assert record["interrupted"] and len(motion) == 1 + 34
+    assert "interrupted" in record["notes"][0]
+
+
 def test_a_window_longer_than_the_path_and_a_lock(model):
     motion, record = motionlab.design([[0, 0], [0.3, 0]], model=model, lock=True, **QUICK)
     assert 2 <= len(motion) < 34 and motion.positions().isfinite().all()

@@ -9,7 +9,7 @@ The motion stands where the path stands: x to the left of one who looks along z,
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from numbers import Real
 
 import torch
@@ -27,6 +27,7 @@ from ..paths import CORNER, Curves, Path
 from ..weights import load
 from .path_control import Followed, follow
 from .run_up import pick_start, run_up
+from .windows import News
 
 STRIDE = 1.1  # seconds, of a walk
 HASTE = 3.0  # deviations above the data's mean step: nobody is faster
@@ -46,6 +47,7 @@ def design(
     refiner: nn.Module | None = None,
     lock: bool = False,
     seed: int = 0,
+    watch: Callable[[Motion, float], None] | None = None,
     progress: bool = False,
     **settings,
 ) -> tuple[Motion, dict]:
@@ -65,6 +67,9 @@ def design(
     refiner : corrects the motion behind the search.
     lock : hold toes still while they are in contact, at the very end.
     seed : of all chance.
+    watch : called behind each window as ``watch(motion, done)`` with the frames that newly stand fast,
+        where they stand in the world, and the share of the path that is done, 0 to 1. Put together they
+        are what is given in the end, before refiner and lock. KeyboardInterrupt in it leaves off.
     progress : show a bar. Interrupted (Ctrl-C), what is solved so far is given.
     settings : of `path_control.follow`, such as weights, method, steps, candidates.
 
@@ -80,7 +85,8 @@ def design(
     ModelError : there are no such weights.
     """
     path = points if isinstance(points, Path) else Path.through(points, times, spline, corner)
-    return design_all([path], speed, start, model, refiner=refiner, lock=lock, seed=seed,
+    one = None if watch is None else lambda number, motion, done: watch(motion, done)
+    return design_all([path], speed, start, model, refiner=refiner, lock=lock, seed=seed, watch=one,
                       progress=progress, **settings)[0]  # fmt: skip
 
 
@@ -93,10 +99,14 @@ def design_all(
     refiner: nn.Module | None = None,
     lock: bool = False,
     seed: int = 0,
+    watch: Callable[[int, Motion, float], None] | None = None,
     progress: bool = False,
     **settings,
 ) -> list[tuple[Motion, dict]]:
-    """`design` for many paths side by side, which takes far less time than one after the other."""
+    """`design` for many paths side by side, which takes far less time than one after the other.
+
+    watch is called as ``watch(number of the path, motion, done)``.
+    """
     name = model if isinstance(model, str) else getattr(model, "about", {}).get("name", "")
     model = _checked(load(model) if isinstance(model, str) else model, refiner)
     speed = _speed(speed, paths)
@@ -107,9 +117,11 @@ def design_all(
     sampling = getattr(model, "sampling", {})
     chance = Chance(torch.Generator().manual_seed(seed), **sampling)
     before = run_up(model, starts, paths, paces, chance)
+    seen = None if watch is None else _shown(model, watch)
     found = follow(
-        model, paths, before, tables, fastest=fastest, chance=chance, progress=progress, **settings
-    )
+        model, paths, before, tables, fastest=fastest, chance=chance, watch=seen, progress=progress,
+        **settings,
+    )  # fmt: skip
     made = []
     for path, walked, number, table in zip(paths, found, starts, tables, strict=True):
         motion = _motion(model, walked, refiner, lock, f"path {path.length:.1f} m", name)
@@ -117,6 +129,18 @@ def design_all(
         record["start"] = (getattr(model, "start_names", ()) or ("",) * (number + 1))[number]
         made.append((motion, record))
     return made
+
+
+def _shown(model: LstmGmm, watch: Callable[[int, Motion, float], None]) -> Callable[[News], None]:
+    """News of features as motion; the frame that a path begins with comes with its first."""
+    begun = set()
+
+    def seen(news: News) -> None:
+        motion = model.encoding.to_motion(news.features, news.place)
+        watch(news.path, motion[news.path in begun :], news.done)
+        begun.add(news.path)
+
+    return seen
 
 
 def fastest_of(model: LstmGmm) -> float:

@@ -101,7 +101,12 @@ def recently(recent: Tensor, fps: float) -> tuple[Tensor, Tensor, Tensor]:
 
 @torch.no_grad()
 def guided(
-    model: LstmGmm, before: Before, steering: Steering, arcs: Tensor, chance: Chance
+    model: LstmGmm,
+    before: Before,
+    steering: Steering,
+    arcs: Tensor,
+    chance: Chance,
+    push: bool = True,
 ) -> tuple[Tensor, Tensor]:
     """Motion that goes on from where it is along its path.
 
@@ -110,7 +115,7 @@ def guided(
     model : on `JointAngles`, whose first channels are step to the left, step ahead, turn.
     before : (batch), where it goes on; steering : the same characters, moved along.
     arcs : (batch, frames), metres of path that should lie behind them, frame by frame.
-    chance : how frames are drawn.
+    chance : how frames are drawn; push : without it they are drawn freely.
 
     Returns
     -------
@@ -125,13 +130,13 @@ def guided(
         # what the timetable wants next, and a share of what is late or early
         due = (arcs[:, t] - last) + 0.1 * (last - steering.arcs)
         last = arcs[:, t]
-        ahead, turn = steering.push((due * steering.fps).clamp(min=0))
+        pushes = steering.push((due * steering.fps).clamp(min=0)) if push else ()
         chosen = choose(mixture.log_weights / component_temperature, generator)
         rows = torch.arange(len(chosen))
         mean, deviation = mixture.means[rows, chosen], mixture.stds[rows, chosen]
         pushed = mean.clone()
-        for channel, push in ((1, ahead), (2, turn)):
-            pushed[:, model.normalizer.kept == channel] += (push.to(std) / std[channel])[:, None]
+        for channel, more in zip((1, 2), pushes, strict=False):
+            pushed[:, model.normalizer.kept == channel] += (more.to(std) / std[channel])[:, None]
         noise = noise_to_draw(state.noise, deviation, memory, generator)
         seen = pushed + temperature * deviation * noise
         frame = model.normalizer.inverse(seen)

@@ -4,8 +4,8 @@ Window after window of 34 frames, 17 of which are solved again with the next: th
 window do not know yet what comes. In each,
 
 1. `guided` sampling draws a few ways to go on, and the least unlikely is the first guess;
-2. `window.solve` descends from there, and goes on where that has not led near the path (`LONGER`);
-3. who fell off his path, or his feet, begins again from other samples (`RETRIES` times);
+2. `window.solve` descends from there, and goes on where that has not led near the path (`windows.LONGER`);
+3. who fell off his path, or his feet, begins again from other samples (`retries` times);
 4. the first 17 frames stand fast, and the network's state goes on exactly behind them.
 
 All paths go side by side, as one batch.
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -24,39 +24,15 @@ from tqdm import tqdm
 from ..errors import SolverError
 from ..models import LstmGmm
 from ..models.sampler import Chance
-from ..paths import Curves, Path
+from ..paths import Path
 from . import terms
-from .energy import Before, Energy
-from .guided import Steering, guided
-from .window import METHODS, Solved, solve
+from .energy import Before
+from .window import METHODS
+from .windows import RETRIES, Job, News, Settings, Stretch, Way, Wishes
 
 WINDOW, OVERLAP = 34, 17  # frames, the paper's
 CANDIDATES, STEPS = 4, 25
-LONGER, ROUGH = 2, 0.012  # times; m, root mean square from the path in a window
-RETRIES = 2
-ASTRAY = 0.10  # m, root mean square from the path in a window: that is no following
-STRANGE = 20.0  # deviations of the data from their mean: no body is there
-UNLIKELY = 60.0  # nats a frame less than samples have: the body comes apart
-LEEWAY = 0.3  # seconds behind a timetable that are caught up with
 PATIENCE = 2.0  # times the frames of the timetable, after which nobody waits any longer
-
-
-@dataclass
-class Stretch:
-    """What the wishes of a window are made from; see `wishes`.
-
-    piece : the path about there; arcs : (batch, frames) metres that should lie behind the root,
-    frame by frame; which : (batch,) number of each path; first : number of its first frame.
-    """
-
-    model: LstmGmm
-    piece: terms.Piece
-    arcs: Tensor
-    which: Tensor
-    first: int
-
-
-Wishes = Callable[[Stretch], Mapping[str, terms.Term]]
 
 
 def wishes(stretch: Stretch) -> dict[str, terms.Term]:
@@ -95,19 +71,6 @@ class Followed:
     interrupted: bool
 
 
-@dataclass
-class _Way:
-    """One path on its way: its timetable, and what stands fast of it so far."""
-
-    table: Tensor
-    frames: list[Tensor]  # (some, dim) each
-    parts: list[dict[str, float]] = field(default_factory=list)
-    evaluations: int = 0
-    retries: int = 0
-    finished: bool = False
-    clock: float = 0.0  # frame of the timetable
-
-
 def follow(
     model: LstmGmm,
     paths: Sequence[Path],
@@ -120,9 +83,12 @@ def follow(
     method: str = "adam",
     steps: int = STEPS,
     candidates: int = CANDIDATES,
+    guide: bool = True,
+    retries: int = RETRIES,
     window: int = WINDOW,
     overlap: int = OVERLAP,
     chance: Chance | None = None,
+    watch: Callable[[News], None] | None = None,
     progress: bool = False,
 ) -> list[Followed]:
     """Motion along paths, side by side.
@@ -135,12 +101,14 @@ def follow(
     fastest : m/s that who is late does not go beyond.
     wish : what is wished in a window; weights : of its terms, by name.
     method, steps : of `window.solve`.
-    candidates : samples that the first guess is chosen from.
-    window, overlap : frames.
+    candidates : samples that the first guess is chosen from; guide : whether they are guided to the
+        path, or free. retries : times that a window which came to nothing begins again.
+    window, overlap : frames; with a window of 1 and no overlap nobody looks ahead.
     chance : how samples are drawn; None: as the model's `sampling` says, from seed 0.
+    watch : called behind each window, for each path that is still walked, with what newly stands fast.
     progress : show a bar.
 
-    Interrupted (Ctrl-C), it gives what it has, and says so.
+    Interrupted (Ctrl-C, or a KeyboardInterrupt in `watch`), it gives what it has, and says so.
 
     Raises
     ------
@@ -148,21 +116,22 @@ def follow(
     """
     if chance is None:
         chance = Chance(torch.Generator().manual_seed(0), **getattr(model, "sampling", {}))
-    _check(method, steps, candidates, window, overlap)
+    how = Settings(fastest, wish, weights or {}, chance, method, steps, candidates, guide, retries,
+                   window, overlap)  # fmt: skip
+    _check(how)
     ways = [
-        _Way(table.double(), [frame])
+        Way(table.double(), [frame])
         for table, frame in zip(tables, before.frame[:, None], strict=True)
     ]
-    job = _Job(
-        model, list(paths), before, ways, fastest, wish, weights or {}, chance, method, steps,
-        candidates, window, overlap,
-    )  # fmt: skip
+    job = Job(model, list(paths), before, ways, how)
     begin, longest, interrupted = time.process_time(), max(map(len, tables)) - 1, False
     with tqdm(total=longest, unit="frame", disable=not progress, leave=False) as bar:
         try:
             while len(job.which) and job.first < PATIENCE * longest + window:
-                job.go_on()
+                fast = job.go_on()
                 bar.update(min(window - overlap, longest - bar.n))
+                for news in fast if watch else ():
+                    watch(news)
         except KeyboardInterrupt:
             if not job.first:
                 raise
@@ -171,213 +140,9 @@ def follow(
     seconds = (time.process_time() - begin) / len(paths)
     return [
         Followed(torch.cat(way.frames), place, _means(way.parts), way.evaluations, way.retries,
-                 seconds, way.finished, interrupted)
+                 seconds, way.finished, interrupted and not way.finished)
         for way, place in zip(job.ways, before.place, strict=True)
     ]  # fmt: skip
-
-
-@dataclass
-class _Job:
-    """All paths that are still being walked, and where each of them is."""
-
-    model: LstmGmm
-    paths: list[Path]
-    before: Before
-    ways: list[_Way]
-    fastest: float
-    wish: Wishes
-    weights: Mapping[str, float]
-    chance: Chance
-    method: str
-    steps: int
-    candidates: int
-    window: int
-    overlap: int
-
-    def __post_init__(self) -> None:
-        self.curves, self.which = Curves(self.paths), torch.arange(len(self.paths))
-        self.arcs = torch.zeros(len(self.paths), dtype=torch.float64)
-        self.recent = self.before.frame[:, None, :3]  # the last steps and turns
-        self.tail: tuple[Tensor, Tensor] | None = None  # what is to be solved again
-        self.usual: float | None = None  # log-likelihood a frame of what the network samples
-        self.first = 0
-
-    def go_on(self) -> None:
-        """Solve a window, and let its first frames stand fast."""
-        arcs = self._due()
-        rows = torch.arange(len(self.which))
-        solved = self._solve(arcs, rows, *self._guess(arcs, rows))
-        for _ in range(LONGER if self.method in ("adam", "lbfgs") else 0):
-            rough = rows[self._off(arcs, solved) > ROUGH]
-            if len(rough):
-                further = self._solve(arcs, rough, solved.s[rough], solved.d[rough])
-                solved = _better(solved, further, rough)
-        for _ in range(RETRIES):
-            lost = rows[self._astray(arcs, solved)]
-            if len(lost):
-                again = self._solve(arcs, lost, *self._guess(arcs, lost))
-                solved = _better(solved, again, lost)
-            for number in self.which[lost].tolist():
-                self.ways[number].retries += 1
-        self._stand_fast(arcs, solved)
-
-    def leave_off(self) -> None:
-        """What is solved and waited for what comes next stands fast as it is."""
-        for row, number in enumerate(self.which.tolist()):
-            self.ways[number].frames.append(self.model.normalizer.inverse(self.tail[0][row]))
-
-    def _due(self) -> Tensor:
-        """Metres (batch, frames) that should lie behind the roots in the window's frames."""
-        rows, ahead = [], torch.arange(1, self.window + 1, dtype=torch.float64)
-        for row, number in enumerate(self.which.tolist()):
-            way, arc, leeway = self.ways[number], float(self.arcs[row]), LEEWAY * self.model.fps
-            table = way.table
-            if self.paths[number].times is None:
-                # no hour is fixed: whoever is far behind his timetable, or ahead, goes on from there
-                here = _inverse(table, arc)
-                way.clock = here + min(max(way.clock - here, -leeway), leeway)
-            index = way.clock + ahead
-            last = len(table) - 1
-            low = index.floor().clamp(0, last - 1).long()
-            due = torch.lerp(table[low], table[low + 1], (index - low).clamp(0, 1))
-            pace = max(
-                float(table[max(last - 2, 0)] - table[max(last - 3, 0)]), 0.3 / self.model.fps
-            )
-            due = due + (index - last).clamp(min=0) * pace  # beyond the end it walks on
-            rows.append(torch.minimum(due, arc + ahead * (self.fastest / self.model.fps)))
-        return torch.stack(rows)
-
-    def _energy(self, arcs: Tensor, rows: Tensor) -> Energy:
-        """Of the windows of some of the batch; a row may be asked for again and again."""
-        first, last = self.arcs[rows] - 0.5, arcs[rows].amax(1) + 2.0
-        piece = self.curves.piece(first, last, self.which[rows])
-        stretch = Stretch(self.model, piece, arcs[rows], self.which[rows], self.first)
-        return Energy(self.model, self.before[rows], self.wish(stretch), self.weights)
-
-    def _solve(self, arcs: Tensor, rows: Tensor, s: Tensor, d: Tensor) -> Solved:
-        """From a guess, for some of the batch."""
-        energy = self._energy(arcs, rows)
-        solved = solve(energy, s, d, self.method, self.steps, self.chance.generator)
-        for number in self.which[rows].tolist():
-            self.ways[number].evaluations += solved.evaluations
-        return solved
-
-    @torch.no_grad()
-    def _guess(self, arcs: Tensor, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """The least unlikely of a few guided samples; they begin with the tail of the window before."""
-        many = rows.repeat_interleave(self.candidates)
-        before, place, recent = self.before[many], self.before.place[many], self.recent[many]
-        done, where = 0, self.arcs[many]
-        if self.tail is not None:
-            s, d = (part[many] for part in self.tail)
-            features = self.model.normalizer.inverse(s)
-            _, state = self.model.read(features, before.state, d)
-            rows_of = torch.cat([before.frame[:, None], features], 1)
-            path, yaw = (
-                self.model.encoding.root_path(rows_of, before.place),
-                features[..., 2].sum(1),
-            )
-            place = torch.cat([path[:, -1, [0, 2]], (place[:, 2] + yaw)[:, None]], 1)
-            piece = self.curves.piece(where - 0.5, arcs[many].amax(1) + 1, self.which[many])
-            where = piece.nearest(place[:, None, :2].double()).arcs[:, 0]
-            recent, done = features[..., :3], features.shape[1]
-            before = Before(state, features[:, -1], place)
-        steering = Steering.after(
-            self.curves, self.which[many], self.model.fps, place, where, recent[:, -10:]
-        )
-        new = guided(self.model, before, steering, arcs[many, done:], self.chance)
-        if self.tail is not None:
-            new = tuple(torch.cat([a[many], b], 1) for a, b in zip(self.tail, new, strict=True))
-        energy = self._energy(arcs, many)
-        if self.usual is None:
-            features = self.model.normalizer.inverse(new[0])
-            self.usual = float(energy.mixture(features, new[1]).log_prob(new[0]).median())
-        value = energy(*new).nan_to_num(torch.inf).view(len(rows), -1)
-        for number in self.which[rows].tolist():
-            self.ways[number].evaluations += self.candidates
-        which = value.argmin(1) + torch.arange(len(rows)) * self.candidates
-        return new[0][which], new[1][which]
-
-    @torch.no_grad()
-    def _off(self, arcs: Tensor, solved: Solved) -> Tensor:
-        """Metres (batch,), root mean square, from the path; 0 where nobody asks for one."""
-        energy = self._energy(arcs, torch.arange(len(self.which)))
-        if "path" not in energy.terms or energy.weights.get("path") == 0:
-            return torch.zeros(len(self.which))
-        features = torch.cat(
-            [self.before.frame[:, None], self.model.normalizer.inverse(solved.s)], 1
-        )
-        root = self.model.encoding.root_path(features, self.before.place)[:, 1:, [0, 2]]
-        piece = self.curves.piece(self.arcs - 0.5, arcs.amax(1) + 2.0, self.which)
-        return (root - piece.nearest(root).places).square().sum(-1).mean(1).sqrt()
-
-    @torch.no_grad()
-    def _astray(self, arcs: Tensor, solved: Solved) -> Tensor:
-        """Who (batch,) is not where he should be, or comes apart."""
-        energy = self._energy(arcs, torch.arange(len(self.which)))
-        features = self.model.normalizer.inverse(solved.s)
-        likely = energy.mixture(features, solved.d).log_prob(solved.s).mean(1)
-        well = (self._off(arcs, solved) < ASTRAY) & (solved.s.abs().amax((1, 2)) < STRANGE)
-        return ~(well & (likely > self.usual - UNLIKELY) & solved.energy.isfinite())
-
-    @torch.no_grad()
-    def _stand_fast(self, arcs: Tensor, solved: Solved) -> None:
-        """The window's first frames are decided; state, place and path go on behind them."""
-        parts = self._energy(arcs, torch.arange(len(self.which))).parts(solved.s, solved.d)
-        keep = self.window - self.overlap
-        features = self.model.normalizer.inverse(solved.s)
-        kept, before = features[:, :keep], self.before
-        _, state = self.model.read(kept, before.state, solved.d[:, :keep])
-        walked = self.model.encoding.root_path(
-            torch.cat([before.frame[:, None], kept], 1), before.place
-        )
-        ground = walked[:, 1:, [0, 2]].double()
-        piece = self.curves.piece(self.arcs - 0.5, arcs.amax(1) + 2.0, self.which)
-        behind = piece.nearest(ground).arcs
-        yaw = before.place[:, 2] + kept[..., 2].double().sum(1)
-        place = torch.cat([ground[:, -1], yaw[:, None]], 1)
-        going = torch.ones(len(self.which), dtype=torch.bool)
-        for row, number in enumerate(self.which.tolist()):
-            way, path = self.ways[number], self.paths[number]
-            way.parts.append({name: float(v[row]) / self.window for name, v in parts.items()})
-            frames = _until_end(behind[row], path, len(way.table) - 1 - self.first)
-            way.frames.append(kept[row, :frames])
-            going[row] = frames == keep
-            way.clock += keep
-            way.finished = frames < keep
-        self.before = Before(state[going], kept[going, -1], place[going])
-        self.tail = solved.s[going, keep:], solved.d[going, keep:]
-        self.which, self.arcs, self.recent = (
-            self.which[going],
-            behind[going, -1],
-            kept[going, :, :3],
-        )
-        self.first += keep
-
-
-def _until_end(behind: Tensor, path: Path, left: int) -> int:
-    """How many of the frames with metres `behind` (frames,) still belong to the path."""
-    if path.times is not None:
-        return min(len(behind), left)
-    there = (behind >= path.length - 0.01).nonzero()[:, 0]
-    return int(there[0]) + 1 if len(there) else len(behind)
-
-
-def _inverse(table: Tensor, arc: float) -> float:
-    """The (fractional) frame at which a rising table (frames,) has come to `arc`."""
-    high = int(torch.searchsorted(table, arc).clamp(1, len(table) - 1))
-    low, step = table[high - 1], table[high] - table[high - 1]
-    return high - 1 + float(((arc - low) / step.clamp(min=1e-9)).clamp(0, 1))
-
-
-def _better(solved: Solved, again: Solved, rows: Tensor) -> Solved:
-    """Windows with the lower energy of two tries; the second is for some rows only."""
-    won = rows[again.energy < solved.energy[rows]]
-    mine = (again.energy < solved.energy[rows]).nonzero()[:, 0]
-    parts = [part.clone() for part in solved[:3]]
-    for part, new in zip(parts, again[:3], strict=True):
-        part[won] = new[mine]
-    return Solved(*parts, solved.evaluations + again.evaluations)
 
 
 def _means(parts: list[dict[str, float]]) -> dict[str, float]:
@@ -386,13 +151,32 @@ def _means(parts: list[dict[str, float]]) -> dict[str, float]:
     )
 
 
-def _check(method: str, steps: int, candidates: int, window: int, overlap: int) -> None:
-    if method not in METHODS:
-        raise SolverError(f"method is {method!r}; it must be one of {', '.join(METHODS)}.")
-    if steps < 1 or candidates < 1:
-        raise SolverError(f"{steps} steps, {candidates} candidates: at least 1 of each.")
-    if not 2 <= window or not 1 <= overlap < window:
+def _check(how: Settings) -> None:
+    if how.method not in METHODS:
+        raise SolverError(f"method is {how.method!r}; it must be one of {', '.join(METHODS)}.")
+    if how.steps < 1 or how.candidates < 1 or how.retries < 0:
         raise SolverError(
-            f"Windows of {window} frames that share {overlap}: they must share at least 1 and go on "
-            "by at least 1."
+            f"{how.steps} steps, {how.candidates} candidates, {how.retries} retries: at least 1, 1 and 0."
         )
+    if not 0 <= how.overlap < how.window or (how.window > 1 and how.overlap < 1):
+        raise SolverError(
+            f"Windows of {how.window} frames that share {how.overlap}: they must share at least 1 and "
+            "go on by at least 1. A window of 1 frame shares none."
+        )
+
+
+# What a search is compared with: settings of `follow` and of `motionlab.design`.
+BASELINES: dict[str, dict] = {
+    "best of 64 free samples": {"method": "none", "guide": False, "candidates": 64, "retries": 0},
+    "guided sampling": {"method": "none", "candidates": 1, "retries": 0},
+    "swarm": {"method": "swarm", "guide": False, "candidates": 1, "retries": 0, "steps": 30},
+    "L-BFGS": {"method": "lbfgs", "guide": False, "candidates": 1, "retries": 0, "steps": 60},
+    "swarm, then L-BFGS": {
+        "method": "paper",
+        "guide": False,
+        "candidates": 1,
+        "retries": 0,
+        "steps": 60,
+    },
+    "frame by frame": {"window": 1, "overlap": 0},
+}

@@ -9,8 +9,8 @@ must agree.
 
 Adam is what is used, with steps as long as a deviation and a short memory: it comes as low as with
 its usual settings, frame by frame, in a fifth of the steps (``benchmarks/bench_design.py``). L-BFGS, the paper's, is
-there to compare: windows of a batch must share its step lengths. So is the swarm, the paper's
-beginning: it sees little in four thousand dimensions.
+there to compare: windows of a batch must share its step lengths. So are the swarm, the paper's
+beginning, which sees little in four thousand dimensions, and "paper": a few of its moves, then L-BFGS.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from ..models import Mixture
 from .energy import NOISE, Energy
 from .swarm import swarm
 
-METHODS = ("adam", "lbfgs", "swarm", "none")
+METHODS = ("adam", "lbfgs", "swarm", "paper", "none")
+DESCENTS = ("adam", "lbfgs", "paper")
+FEW = 10  # moves of the swarm before L-BFGS, as the paper does it
 RATE = 1.0  # of Adam, in deviations; falls to a tenth over the second half
 PUSH, SQUARE = 0.5, 0.8  # what Adam keeps of its averages of slopes and of their squares, a step
 LASTS = 0.7  # of a change in a frame, in the next
@@ -59,8 +61,10 @@ def solve(
         _adam(search, free, steps)
     elif method == "lbfgs":
         _lbfgs(search, free, steps)
-    elif method == "swarm":
-        _swarm(search, free, steps, generator)
+    elif method in ("swarm", "paper"):
+        _swarm(search, free, steps if method == "swarm" else FEW, generator)
+        if method == "paper":
+            _lbfgs(search, search.best, steps)
     else:
         search.look(free)
     return Solved(*search.at(search.best), search.least, search.evaluations)
