@@ -9,6 +9,7 @@ import motionlab
 from motionlab.__main__ import main
 from motionlab.datasets import gaits
 from motionlab.errors import MotionLabError, SolverError, WayError
+from motionlab.models import Refiner
 from motionlab.paths import Path
 from motionlab.solvers.design import design_all, enlarged, fastest_of
 
@@ -48,6 +49,21 @@ def test_what_no_one_can_do_is_told_by_how_much_and_where(model):
         assert motion.positions().isfinite().all()
         far = record["error (cm)"]["largest"] > 5
         assert far == any("from the drawn line, at" in note for note in record["notes"])
+
+
+def test_a_refiner_moves_the_body_and_not_its_way(model):
+    torch.manual_seed(0)
+    refiner = Refiner(model.encoding, model.normalizer, width=8).eval().requires_grad_(False)
+    for weights in refiner.parameters():
+        torch.nn.init.normal_(weights, std=0.3)
+    plain, record = motionlab.design(CORNER, model=model, **QUICK)
+    refined, of_refined = motionlab.design(CORNER, model=model, refiner=refiner, **QUICK)
+    assert not torch.allclose(refined.rotations, plain.rotations, atol=1e-3)
+    ground = [motion.root_positions[:, [0, 2]] for motion in (refined, plain)]
+    torch.testing.assert_close(*ground)
+    assert of_refined["error (cm)"] == pytest.approx(record["error (cm)"], abs=1e-3)
+    locked, _ = motionlab.design(CORNER, model=model, refiner=refiner, lock=True, **QUICK)
+    torch.testing.assert_close(locked.root_positions[:, [0, 2]], ground[0])
 
 
 def test_what_is_watched_is_the_motion_where_it_stands(model):

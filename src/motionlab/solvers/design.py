@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from numbers import Real
 
 import torch
@@ -64,8 +65,8 @@ def design(
         last.
     spline : a smooth curve through the points.
     corner : metres, radius to which sharper corners are rounded, as people do.
-    refiner : corrects the motion behind the search.
-    lock : hold toes still while they are in contact, at the very end.
+    refiner : corrects the motion behind the search; the root stays over the way that was found.
+    lock : hold toes still while they are in contact, at the very end; the root may sink, and no more.
     seed : of all chance.
     watch : called behind each window as ``watch(motion, done)`` with the frames that newly stand fast,
         where they stand in the world, and the share of the path that is done, 0 to 1. Put together they
@@ -301,7 +302,12 @@ def _motion(
         with torch.no_grad():
             features = refiner(features[None])[0]
     motion = model.encoding.to_motion(features, walked.place, name, source)
+    if refiner is not None:  # which knows of no path, and leaves it by some millimetres a step
+        way = model.encoding.root_path(walked.features, walked.place)
+        height = motion.root_positions[:, 1]
+        motion = replace(motion, root_positions=torch.stack([way[:, 0], height, way[:, 2]], 1))
     if lock:
-        found = label(motion) if motion.contacts is None else motion.contacts
+        found = label(motion)  # the network tells a frame late now and then, the refiner another
+        found = found if motion.contacts is None else found | motion.contacts
         motion = lock_feet(motion, found, floor=None)
     return motion

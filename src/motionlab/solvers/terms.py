@@ -39,6 +39,7 @@ SPEED = 0.1  # m/s of a window's mean speed
 FACING = 0.2  # rad; people face 0.19 off their way
 STEP = 0.03  # m
 SLIDE, HEIGHT = 0.004, 0.008  # m a frame, m: a fifth of what sampled toes do; recorded do neither
+REST = 0.002  # m a frame: heels, which no lock holds afterwards
 SLOW = 0.45  # m/s, of a foot in contact: the paper's
 ROOT, ANGLE = 0.02, 0.08  # m, rad: the weaker noise that denoising is tried on
 _GROUND = [0, 2]
@@ -174,7 +175,7 @@ def contact(skeleton: Skeleton, slide: float = SLIDE, height: float = HEIGHT) ->
     return term
 
 
-def resting(skeleton: Skeleton, fps: float, slide: float = SLIDE, slower: float = SLOW) -> Term:
+def resting(skeleton: Skeleton, fps: float, slide: float = REST, slower: float = SLOW) -> Term:
     """What is slow rests: heels and toes that move by less than `slower` m/s do not move at all.
 
     The network tells of toes only, and now and then a frame too late. This asks the feet themselves,
