@@ -121,6 +121,35 @@ def test_who_is_astray_begins_again_so_often_and_no_more(walker, monkeypatch):
     assert way.features.isfinite().all()
 
 
+def test_who_holds_a_broken_pose_begins_again_and_whole_ones_win(walker, monkeypatch):
+    """Even if their energy is higher: what is judged first is always called broken here."""
+    judged = []
+
+    def beyond(encoding, features):
+        judged.append(len(features))
+        return torch.full(features.shape[:2], 1.0 if len(judged) % 2 else -1.0)
+
+    monkeypatch.setattr(windows.broken, "beyond", beyond)
+    monkeypatch.setattr(windows, "ASTRAY", torch.inf)
+    monkeypatch.setattr(windows, "UNLIKELY", torch.inf)
+    table = STRAIGHT.timetable(1.2, 4.0, 30.0)
+    (way,) = follow(
+        walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [table], chance=calm(),
+        **QUICK | {"retries": 1},
+    )  # fmt: skip
+    assert way.retries == len(judged) / 2 == -(-len(way.features[1:]) // 6)
+
+
+def test_better_is_lower_or_whole():
+    first = windows.Solved(torch.zeros(3, 1), torch.zeros(3, 1), torch.tensor([1.0, 2, 3]), 1)
+    again = windows.Solved(torch.ones(2, 1), torch.ones(2, 1), torch.tensor([9.0, 1]), 1)
+    rows = torch.tensor([1, 2])
+    found = windows._better(first, again, rows)
+    assert found.energy.tolist() == [1, 2, 1] and found.s[:, 0].tolist() == [0, 0, 1]
+    found = windows._better(first, again, rows, torch.tensor([True, False]))
+    assert found.energy.tolist() == [1, 9, 1] and found.s[:, 0].tolist() == [0, 1, 1]
+
+
 @pytest.mark.parametrize(("rough", "more"), [(0.0, True), (10.0, False)])
 def test_who_is_not_near_goes_on_searching(walker, before, monkeypatch, rough, more):
     monkeypatch.setattr(windows, "ROUGH", rough)
@@ -229,9 +258,13 @@ def test_settings_that_make_no_sense(walker, options, said):
 
 def test_a_start_is_picked_by_name_and_speed(walker):
     assert [pick_start(walker, None, pace) for pace in (0.9, 2.0, 2.9)] == [0, 0, 1]
-    assert pick_start(walker, "run", 1.0) == 1 and pick_start(walker, "2", 1.0) == 2
+    assert (
+        pick_start(walker, 2, 1.0) == 2
+        and pick_start(walker, "run", 1.0) == 1
+        and pick_start(walker, "2", 1.0) == 2
+    )
     assert pick_start(walker, "walk 0.8", 1.0) == 2 and pick_start(walker, "walk", 0.8) == 0
-    for wrong in ("fly", "7", ""):
+    for wrong in ("fly", "7", "", 7, -1):
         with pytest.raises(SolverError, match=r"1 run 3\.0 m/s"):
             pick_start(walker, wrong, 1.0)
 

@@ -24,6 +24,7 @@ metric                            unit              what it asks
 `cadence`, `step_length`          steps/min, m      gait
 `time_to_freeze`, `stagnations`   s                 does it stop for good, or for a while?
 `time_to_divergence`              s                 does it leave what bodies do?
+`broken_frames`                   bool a frame      does it hold a pose that nobody in the data holds?
 `survival`                        share over s      how many last how long?
 `repetition`, `loop`              share, s          does it repeat itself?
 `converged`                       groups            do rollouts end in the same motion?
@@ -35,6 +36,7 @@ metric                            unit              what it asks
 """
 
 from .bootstrap import Interval, bootstrap, jackknife
+from .broken import broken_frames
 from .change import feature_change, motion_change
 from .failure import (
     Limits,
@@ -67,6 +69,7 @@ __all__ = [
     "acceleration",
     "at_milliseconds",
     "bootstrap",
+    "broken_frames",
     "cadence",
     "converged",
     "effector_motion",

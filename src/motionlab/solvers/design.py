@@ -17,10 +17,11 @@ import torch
 from torch import Tensor, nn
 
 from ..encodings import JointAngles
+from ..encodings.base import drawn_as_canonical
 from ..errors import SolverError
 from ..feet.contacts import label
 from ..feet.lock import lock_feet
-from ..metrics import root_path_error
+from ..metrics import broken_frames, root_path_error
 from ..models import LstmGmm, Refiner
 from ..models.sampler import Chance
 from ..motion import Motion
@@ -39,7 +40,7 @@ FAR, LATE, SLOWER = 0.05, 0.5, 0.15  # m, s, share of the speed: what is told
 def design(
     points: Tensor | Sequence | Path,
     speed: float | None = None,
-    start: str | None = None,
+    start: str | int | None = None,
     model: str | nn.Module = "lstm-gmm-contacts",
     *,
     times: Tensor | Sequence | None = None,
@@ -94,7 +95,7 @@ def design(
 def design_all(
     paths: Sequence[Path],
     speed: float | None = None,
-    start: str | None = None,
+    start: str | int | None = None,
     model: str | nn.Module = "lstm-gmm-contacts",
     *,
     refiner: nn.Module | None = None,
@@ -163,7 +164,8 @@ def recorded(
     were rounded; "rms of the stride's mean" is that of the mean error over a stride: sway, which comes and
     goes with each step, is left out.
     "largest error" : where that was, and when. "timing" : speeds, and how late or early it was.
-    "terms" : nats a frame. "notes" : sentences on what was not reached.
+    "broken frames" : those with a pose that nobody in the data holds (`metrics.broken_frames`), or None
+    for a body of which this is not known. "terms" : nats a frame. "notes" : sentences on what was not reached.
     """
     root = motion.positions()[:, motion.skeleton.roles.get("hips", 0)]
     settled = min(round(SETTLED * motion.fps), len(root) - 1)
@@ -173,6 +175,9 @@ def recorded(
     stride = round(STRIDE * motion.fps)
     mean = aside.unfold(0, stride, 1).mean(-1) if len(aside) > stride else None
     seconds = (len(root) - 1) / motion.fps
+    broken = None
+    if drawn_as_canonical(motion.skeleton):
+        broken = int(broken_frames(motion).sum())
     way = float(root[:, [0, 2]].diff(dim=0).norm(dim=-1).sum())
     asked = (len(table) - 1) / motion.fps
     record = {
@@ -198,6 +203,7 @@ def recorded(
         "terms (nats a frame)": walked.parts,
         "evaluations": walked.evaluations,
         "begun again": walked.retries,
+        "broken frames": broken,
         "seconds": walked.seconds,
         "finished": walked.finished,
         "interrupted": walked.interrupted,
@@ -243,6 +249,8 @@ def _notes(record: dict) -> list[str]:
         said.append(f"interrupted: this is the way to {timing['walked (s)']:.1f} s")
     elif not record["finished"]:
         said.append(f"did not come to the end within {timing['walked (s)']:.1f} s")
+    if record["broken frames"]:
+        said.append(f"{record['broken frames']} frames hold a pose that nobody in the data holds")
     if asked is not None and asked > timing["fastest (m/s)"]:
         said.append(
             f"{asked:g} m/s is faster than anybody in the data; {timing['fastest (m/s)']:.1f} m/s "

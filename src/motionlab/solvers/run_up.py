@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from numbers import Integral
 
 import torch
 from torch import Tensor
@@ -22,7 +23,7 @@ STANDING = 0.3  # m/s
 _STEADY = re.compile(r"(walk|run)(?: ([\d.]+) m/s)?$")
 
 
-def pick_start(model: LstmGmm, start: str | None, pace: float) -> int:
+def pick_start(model: LstmGmm, start: str | int | None, pace: float) -> int:
     """Which of a model's starts to begin with.
 
     Parameters
@@ -37,6 +38,7 @@ def pick_start(model: LstmGmm, start: str | None, pace: float) -> int:
     SolverError : there is no such start.
     """
     names = list(getattr(model, "start_names", ()))
+    start = str(start) if isinstance(start, Integral) else start
     if start is not None and start.isdecimal() and int(start) < len(names):
         return int(start)
     named = [i for i, name in enumerate(names) if start is not None and name.startswith(start)]

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from ..metrics import broken
 from ..models import LstmGmm
 from ..models.sampler import Chance
 from ..paths import Curves, Path, Piece
@@ -114,16 +115,17 @@ class Job:
         rows = torch.arange(len(self.which))
         solved = self._solve(arcs, rows, *self._guess(arcs, rows))
         for _ in range(LONGER if self.how.method in DESCENTS else 0):
-            rough = rows[self._off(arcs, solved) > ROUGH]
+            rough = rows[self._off(arcs, solved, rows) > ROUGH]
             if len(rough):
                 further = self._solve(arcs, rough, solved.s[rough], solved.d[rough])
                 solved = _better(solved, further, rough)
         for _ in range(self.how.retries):
-            lost = rows[self._astray(arcs, solved)]
+            lost = rows[self._astray(arcs, solved, rows)]
             if not len(lost):
                 break
             again = self._solve(arcs, lost, *self._guess(arcs, lost))
-            solved = _better(solved, again, lost)
+            whole = ~self._astray(arcs, again, lost)
+            solved = _better(solved, again, lost, whole)
             for number in self.which[lost].tolist():
                 self.ways[number].retries += 1
         return self._stand_fast(arcs, solved)
@@ -209,25 +211,28 @@ class Job:
         return new[0][which], new[1][which]
 
     @torch.no_grad()
-    def _off(self, arcs: Tensor, solved: Solved) -> Tensor:
-        """Metres (batch,), root mean square, from the path; 0 where nobody asks for one."""
-        energy = self._energy(arcs, torch.arange(len(self.which)))
+    def _off(self, arcs: Tensor, solved: Solved, rows: Tensor) -> Tensor:
+        """Metres (rows,), root mean square, from the path; 0 where nobody asks for one."""
+        energy = self._energy(arcs, rows)
         if "path" not in energy.terms or energy.weights.get("path") == 0:
-            return torch.zeros(len(self.which))
-        features = torch.cat(
-            [self.before.frame[:, None], self.model.normalizer.inverse(solved.s)], 1
-        )
-        root = self.model.encoding.root_path(features, self.before.place)[:, 1:, [0, 2]]
-        piece = self.curves.piece(self.arcs - 0.5, arcs.amax(1) + 2.0, self.which)
+            return torch.zeros(len(rows))
+        before = energy.before
+        features = torch.cat([before.frame[:, None], self.model.normalizer.inverse(solved.s)], 1)
+        root = self.model.encoding.root_path(features, before.place)[:, 1:, [0, 2]]
+        first, last = self.arcs[rows] - 0.5, arcs[rows].amax(1) + 2.0
+        piece = self.curves.piece(first, last, self.which[rows])
         return (root - piece.nearest(root).places).square().sum(-1).mean(1).sqrt()
 
     @torch.no_grad()
-    def _astray(self, arcs: Tensor, solved: Solved) -> Tensor:
-        """Who (batch,) is not where he should be, or comes apart."""
-        energy = self._energy(arcs, torch.arange(len(self.which)))
+    def _astray(self, arcs: Tensor, solved: Solved, rows: Tensor) -> Tensor:
+        """Who (rows,) is not where he should be, holds a pose that nobody does, or comes apart."""
+        energy = self._energy(arcs, rows)
         features = self.model.normalizer.inverse(solved.s)
         likely = energy.mixture(features, solved.d).log_prob(solved.s).mean(1)
-        well = (self._off(arcs, solved) < ASTRAY) & (solved.s.abs().amax((1, 2)) < STRANGE)
+        well = self._off(arcs, solved, rows) < ASTRAY
+        well &= solved.s.abs().amax((1, 2)) < STRANGE
+        if broken.knows(self.model.encoding):
+            well &= broken.beyond(self.model.encoding, features).amax(1) < 0
         return ~(well & (likely > self.usual - UNLIKELY) & solved.energy.isfinite())
 
     @torch.no_grad()
@@ -292,10 +297,13 @@ def _inverse(table: Tensor, arc: float) -> float:
     return high - 1 + float(((arc - low) / step.clamp(min=1e-9)).clamp(0, 1))
 
 
-def _better(solved: Solved, again: Solved, rows: Tensor) -> Solved:
-    """Windows with the lower energy of two tries; the second is for some rows only."""
-    won = rows[again.energy < solved.energy[rows]]
-    mine = (again.energy < solved.energy[rows]).nonzero()[:, 0]
+def _better(solved: Solved, again: Solved, rows: Tensor, whole: Tensor | bool = False) -> Solved:
+    """Windows with the lower energy of two tries; the second is for some rows only.
+
+    whole : (rows,) where the second wins at any energy.
+    """
+    wins = (again.energy < solved.energy[rows]) | whole
+    won, mine = rows[wins], wins.nonzero()[:, 0]
     parts = [part.clone() for part in solved[:3]]
     for part, new in zip(parts, again[:3], strict=True):
         part[won] = new[mine]

@@ -1,0 +1,66 @@
+"""Poses that no body of the data takes: knees that give way, a foot turned about, a torso bent double.
+
+A motion may keep to its path by the millimetre and hold such poses: distances do not see them.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from ..encodings import JointAngles
+from ..encodings.base import drawn_as_canonical
+from ..errors import MetricError
+from ..motion import Motion
+
+_FILE = Path(__file__).with_name("pose_ranges.json")  # experiments/data/fit_pose_ranges.py
+
+
+def broken_frames(motion: Motion) -> Tensor:
+    """Whether a body holds a pose beyond those of the training data, bool (frames,).
+
+    Beyond means: the tilt of the root, or one of the three numbers of a joint (its
+    rotation vector from the mean pose), lies farther outside the range that it has in the training
+    split of `locomotion` than any does in the validation split. Recorded motion that lies there is
+    not broken; it is another than walking, running and turning.
+
+    Raises
+    ------
+    MetricError : a skeleton that is not drawn like `Skeleton.canonical`.
+    """
+    if not drawn_as_canonical(motion.skeleton):
+        raise MetricError(
+            "broken_frames knows the ranges of the canonical skeleton's joints; bring the motion there "
+            "with motion.retarget(Skeleton.canonical())."
+        )
+    encoding = JointAngles(motion.skeleton, motion.fps)
+    return beyond(encoding, encoding.encode(motion)) > 0
+
+
+def knows(encoding: JointAngles) -> bool:
+    """Whether `beyond` can judge an encoding's features."""
+    return encoding.rotation == "vector" and drawn_as_canonical(encoding.skeleton)
+
+
+def beyond(encoding: JointAngles, features: Tensor) -> Tensor:
+    """By how many radians (..., frames) features (..., frames, dim) lie beyond; else below 0.
+
+    encoding : one that this module `knows`.
+    """
+    last = encoding.slices["pose"].stop
+    body = features[..., last - len(_ranges()[0]) : last]
+    low, high = (edge.to(body) for edge in _ranges())
+    return torch.maximum(low - body, body - high).amax(-1)
+
+
+@cache
+def _ranges() -> tuple[Tensor, Tensor]:
+    """Least and largest value of each channel from the tilt on, the margin included."""
+    found = json.loads(_FILE.read_text(encoding="utf-8"))
+    with torch.inference_mode(False):
+        low, high = torch.tensor(list(found["ranges"].values())).unbind(1)
+        return low - found["margin"], high + found["margin"]
