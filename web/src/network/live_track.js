@@ -9,13 +9,13 @@ const SMOOTH = 0.35; // seconds: a camera that follows ignores what is quicker
 export class LiveTrack {
   /**
    * `first` is the frame it begins with; `look`: label, name, color, skeleton, middle, bones, extras,
-   * contactPoints, tall.
+   * contactPoints, tall; `seconds` are kept.
    */
-  constructor(encoding, fps, first, look) {
+  constructor(encoding, fps, first, look, seconds = KEPT) {
     const pointCount = encoding.count;
     Object.assign(this, look);
     Object.assign(this, { encoding, fps, pointCount, first, last: first - 1, now: first });
-    this.size = Math.round(KEPT * fps);
+    this.size = Math.round(seconds * fps);
     this.ease = 1 / (SMOOTH * fps);
     this.frames = Array.from({ length: this.size }, () => null); // {points, contacts, middle, yaw, row, place}
     this.points = new Float32Array(3 * (pointCount + this.extras.length));
