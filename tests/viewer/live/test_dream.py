@@ -22,8 +22,9 @@ from motionlab.models import AcLstm, LstmGmm
 from motionlab.models import noise as noise_module
 from motionlab.models.noise import noise_to_draw
 from motionlab.viewer import dream
-from motionlab.viewer.live.dream_page import Dream, page_figure
+from motionlab.viewer.live.dream_page import page_figure
 from motionlab.viewer.live.dream_settings import CONTROLS, trail_of
+from motionlab.viewer.live.network_figure import NetworkFigure
 from motionlab.viewer.live.network_weights import as_in_browser, weights_script
 from motionlab.viewer.live.player import Track
 
@@ -297,7 +298,7 @@ def test_what_suits_the_weights_is_where_the_sliders_stand(model):
 def test_a_page_gets_the_network_and_a_kernel_its_widgets(model, monkeypatch):
     assert dream(model, seconds=1).children[0].payload["frames"] == 31
     monkeypatch.setenv("MOTIONLAB_VIEWER", "page")
-    assert isinstance(dream(model, seconds=0.1), Dream)
+    assert isinstance(dream(model, seconds=0.1), NetworkFigure)
 
 
 def test_a_book_gets_the_weights_beside_its_pages(figure, tmp_path, monkeypatch):

@@ -1,7 +1,7 @@
 // A motion that is being made: the last seconds of it, with what the player asks of a Track.
 import { fitted } from "../fit.js";
 import { toEuler } from "../kinematics.js";
-import { addExtras } from "../motion.js";
+import { addExtras, boxAround } from "../motion.js";
 
 export const KEPT = 20; // seconds that one can go back
 const SMOOTH = 0.35; // seconds: a camera that follows ignores what is quicker
@@ -74,6 +74,26 @@ export class LiveTrack {
   place(time) {
     const [a, b] = [this.at(Math.floor(time)).middle, this.at(Math.floor(time) + 1).middle];
     return [0, 1].map((axis) => a[axis] + (time % 1) * (b[axis] - a[axis]));
+  }
+
+  /** How many frames there are of a motion of which all are kept. */
+  get count() {
+    return this.last + 1;
+  }
+
+  /** Places [x, z] of the root in all frames that are kept. */
+  ground() {
+    return Array.from({ length: this.last - this.oldest + 1 }, (_, i) => this.onGround(this.oldest + i));
+  }
+
+  onGround(frame) {
+    const { x, z } = this.at(frame).place;
+    return [x, z];
+  }
+
+  /** Corners [min x, min z, max x, max z] of the ground that the root covers. */
+  get extent() {
+    return boxAround(this.ground());
   }
 
   /** Direction on the floor to where it faces now. */

@@ -69,6 +69,11 @@ export class Path {
     return kept.length ? { curve: off(this.places), drawn: off(this.drawn) } : null;
   }
 
+  /** Metres between the curve and the place that was drawn farthest from it. */
+  get farthest() {
+    return Math.sqrt(Math.max(...this.drawn.map((point) => nearestOf(point, this.places)[2])));
+  }
+
   /** How often it crosses itself. */
   get crossings() {
     const line = interpolatedPlaces(this.places, Math.ceil(this.length / 0.15));
