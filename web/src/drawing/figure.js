@@ -42,7 +42,10 @@ export class PathFigure {
     this.go = Object.assign(make("button", "ml-load", this.walker.invitation), { type: "button" });
     this.go.addEventListener("click", () => this.walk());
     this.halt = Object.assign(make("button", "ml-load ml-stop", "Stop"), { type: "button", disabled: true });
-    this.halt.addEventListener("click", () => this.walker.stop());
+    this.halt.addEventListener("click", () => {
+      this.halt.disabled = true;
+      this.walker.stop();
+    });
     this.line = make("p", "ml-status");
     this.status = make("p", "ml-status");
     this.results = make("ul", "ml-results");
@@ -74,8 +77,9 @@ export class PathFigure {
     const { name, points, speed, start } = this.content.solved[number];
     const { bodies, tracks, stride, fps, magnified } = this.content.walks;
     this.set("speed", speed);
+    this.board.take(points); // which forgets the start of the one before
     this.set("start", start);
-    this.board.take(points);
+    this.lent = start;
     this.choice.value = number;
     const data = tracks[number];
     const track = new Track({ ...bodies[data.body], ...data, label: "solved beforehand" }, stride, fps, magnified);
@@ -97,6 +101,7 @@ export class PathFigure {
     [this.path, this.trouble, this.note] = judged(this.board.points);
     this.board.show(this.path);
     this.line.textContent = this.trouble ?? this.note;
+    if (this.solved && this.values.start === this.lent) this.set("start", -1);
     Object.assign(this, { solved: null, walked: null });
     delete this.figure.dataset.walked;
     if (this.choice) this.choice.value = -1;
@@ -186,11 +191,11 @@ export class PathFigure {
     this.results.replaceChildren(...told.map(({ track, error }) => {
       const item = make("li", "ml-name");
       item.style.setProperty("--ml-color", track.color);
-      const drawn = error && error.drawn - error.curve > 0.5 ? ` (${cm(error.drawn)} from it as it was drawn, corners and all)` : "";
-      const how = error ? `${cm(error.curve)} from the line, root mean square of the hips after the first second${drawn}` : "too short to say";
-      item.append(make("span", "", `${track.label}: ${how}`));
+      const drawn = error && error.drawn - error.curve > 0.5 ? `; ${cm(error.drawn)} from it with its corners sharp` : "";
+      item.append(make("span", "", `${track.label}: ${error ? `${cm(error.curve)} from the line${drawn}` : "too short to say"}`));
       return item;
     }));
+    if (told.length) this.results.append(make("li", "ml-small", "Root mean square distance of the hips, after the first second."));
   }
 
   say(text) {
