@@ -1,5 +1,7 @@
 // Runs web/src/network/ as a page would, for network_in_node.py: answers the questions in a JSON file.
 import { readFileSync } from "node:fs";
+import { smoothed } from "../../../web/src/drawing/shapes.js";
+import { decode } from "../../../web/src/motion.js";
 import { Dreamer } from "../../../web/src/network/dreamer.js";
 import { guide, GuidedWalk, pickStart, recently, Steering, wanted } from "../../../web/src/network/guided.js";
 import { LstmGmm } from "../../../web/src/network/lstm_gmm.js";
@@ -91,6 +93,21 @@ const answers = {
       arcs.push(steerings.map((steering) => steering.arc));
     });
     return { rows, arcs, places: steerings.map(({ place: { x, z, yaw } }) => [x, z, yaw]) };
+  },
+
+  /** What a hand drew, as the line that was meant. */
+  smoothed({ stroke }) {
+    return smoothed(stroke);
+  },
+
+  /** A track that grew from pieces, and one that became another. */
+  grown({ pieces, whole }) {
+    const [[track], ...others] = pieces.map(decode);
+    for (const [other] of others) track.extend(other);
+    const told = ({ root, local, angles, contacts, way, count, extent }) => ({ root: list(root), local: list(local), angles: list(angles), contacts: list(contacts), way, count, extent });
+    const grown = told(track);
+    track.become(decode(whole)[0]);
+    return { grown, become: told(track), whole: told(decode(whole)[0]) };
   },
 
   recently({ rows, fps }) {

@@ -170,6 +170,16 @@ def test_stop_ends_it_after_the_window(widget, design):
     assert widget.told[-1]["whole"]["frames"] < 35
 
 
+def test_who_closes_the_widget_waits_for_no_more(widget, design):
+    design.windows = 100
+    design.go_on.clear()
+    press(widget)
+    widget.close()
+    design.go_on.set()
+    widget.join()
+    assert widget.told[-1]["whole"]["frames"] < 35
+
+
 def test_another_walk_takes_the_place_of_one_under_way(model, clips):
     design = Design(clips[0], windows=100_000)
     design.clip = type("Endless", (), {"__getitem__": lambda _, rows: clips[0][:17]})()

