@@ -123,8 +123,8 @@ const answers = {
       const walk = new GuidedWalk(read, look, { ...settings, ...change, start, seed, speed }, path);
       walk.reach();
       const root = Array.from({ length: walk.frame + 1 }, (_, frame) => list(walk.track.at(frame).points.slice(0, 3)));
-      const { arrived, fellApart, frame } = walk;
-      return { start, arrived, fellApart, frame, root, error: path.error(root.map(([x, , z]) => [x, z]), read.fps) };
+      const { arrived, fellApart, lost, frame } = walk;
+      return { start, arrived, fellApart, lost, frame, root, error: path.error(root.map(([x, , z]) => [x, z]), read.fps) };
     });
   },
 

@@ -107,16 +107,18 @@ class Design:
             raise ZeroDivisionError("by nothing")
         if seed == 99:
             raise KeyboardInterrupt
-        frames = 0
+        frames, finished = 0, True
         try:
             for window in range(self.windows):
                 frames = 17 * (window + 1)
                 watch(self.clip[frames - 17 : frames], frames / (17 * self.windows))
                 assert self.go_on.wait(10)
         except KeyboardInterrupt:
-            pass
+            finished = False
         error = {"rms": 0.7, "rms to the drawn line": 1.9}
-        return self.clip[:frames], {"error (cm)": error, "notes": ["it was cold"]}
+        return self.clip[:frames], {
+            "error (cm)": error, "notes": ["it was cold"], "finished": finished,
+        }  # fmt: skip
 
 
 @pytest.fixture
@@ -149,7 +151,7 @@ def test_walk_asks_design_and_shows_each_window(widget, design, clips):
     assert {said["id"] for said in widget.told} == {"a"}
     assert [said["frames"]["frames"] for said in (first, second)] == [17, 17]
     assert [said["share"] for said in (first, second)] == [0.5, 1.0]
-    assert end["whole"]["frames"] == 34 and end["notes"] == ["it was cold"]
+    assert end["whole"]["frames"] == 34 and end["notes"] == ["it was cold"] and end["finished"]
     assert end["error"] == {"curve": 0.7, "drawn": 1.9}
     assert end["whole"]["tracks"][0]["name"].startswith("walk along a line")
     json.dumps(widget.told)  # it goes over the wire
@@ -167,7 +169,7 @@ def test_stop_ends_it_after_the_window(widget, design):
     design.go_on.set()
     widget.join()
     assert len(widget.told[-1]["whole"]["tracks"]) == 1
-    assert widget.told[-1]["whole"]["frames"] < 35
+    assert widget.told[-1]["whole"]["frames"] < 35 and not widget.told[-1]["finished"]
 
 
 def test_who_closes_the_widget_waits_for_no_more(widget, design):

@@ -201,6 +201,19 @@ def test_a_walk_begins_where_the_path_begins_and_ends_where_it_ends(walks):
         assert 0.85 < path.length / ((walk["frame"] / 30) * 1.2) < 1.15
 
 
+def test_who_has_lost_the_line_walks_no_farther(tmp_path):
+    """At this speed the network goes off a spiral, in Python as well (4 m, root mean square)."""
+    model = motionlab.load("lstm-gmm-contacts")
+    share = np.linspace(0, 1, 170)
+    radius, angle = 2.4 - 1.6 * share, 3.5 * np.pi * share
+    line = np.stack([2.4 - radius * np.cos(angle), radius * np.sin(angle)], 1).tolist()
+    (walk,) = asking(model, tmp_path)(
+        "walks", "rounded", points=line, speed=2.6, seeds=[0], change=model.sampling
+    )
+    assert walk["lost"] and not walk["arrived"]
+    assert walk["error"]["curve"] < 200  # nobody is watched walking away
+
+
 def test_walks_are_as_far_from_the_line_as_those_of_python(walks):
     page = [walk["error"]["curve"] for walk in walks[0]]
     print("page", np.round(page, 1), "python", np.round(walks[1], 1))

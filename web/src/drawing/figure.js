@@ -52,7 +52,9 @@ export class PathFigure {
     for (const told of [this.line, this.status, this.results]) told.setAttribute("aria-live", "polite");
     panel.append(grid, ...(facts.length ? [provenance(facts)] : []));
     const [left, right, both] = [make("div", "ml-side"), make("div", "ml-side"), make("div", "ml-both")];
-    left.append(this.board.element, this.line, this.go, this.halt, this.status);
+    const buttons = make("div", "ml-buttons");
+    buttons.append(this.go, this.halt);
+    left.append(this.board.element, this.line, buttons, this.status);
     right.append(this.stage, this.results);
     both.append(left, right);
     this.figure.append(both, panel);
@@ -83,7 +85,7 @@ export class PathFigure {
     this.choice.value = number;
     const data = tracks[number];
     const track = new Track({ ...bodies[data.body], ...data, label: "solved beforehand" }, stride, fps, magnified);
-    this.solved = { name, track, error: this.path.error(track.ground(), track.rate) };
+    this.solved = { name, track, finished: true, error: this.path.error(track.ground(), track.rate) };
     this.show();
   }
 
@@ -148,8 +150,8 @@ export class PathFigure {
     this.say(`Walking: ${10 * Math.floor(10 * share)} % of the line`);
   }
 
-  done({ error, notes }) {
-    Object.assign(this.walked, { error, growing: false });
+  done({ error, notes, finished }) {
+    Object.assign(this.walked, { error, finished, growing: false });
     this.player.grow(false);
     this.figure.dataset.walked = "";
     this.say(notes.length ? `What could not be: ${notes.join("; ")}.` : "");
@@ -188,11 +190,12 @@ export class PathFigure {
   /** How far from the line each of them went. */
   sayErrors() {
     const told = [this.solved, this.walked].filter((one) => one && !one.growing);
-    this.results.replaceChildren(...told.map(({ track, error }) => {
+    this.results.replaceChildren(...told.map(({ track, error, finished }) => {
       const item = make("li", "ml-name");
       item.style.setProperty("--ml-color", track.color);
       const drawn = error && error.drawn - error.curve > 0.5 ? `; ${cm(error.drawn)} from it with its corners sharp` : "";
-      item.append(make("span", "", `${track.label}: ${error ? `${cm(error.curve)} from the line${drawn}` : "too short to say"}`));
+      const far = finished ? "" : ", as far as it went";
+      item.append(make("span", "", `${track.label}: ${error ? `${cm(error.curve)} from the line${far}${drawn}` : "too short to say"}`));
       return item;
     }));
     if (told.length) this.results.append(make("li", "ml-small", "Root mean square distance of the hips, after the first second."));

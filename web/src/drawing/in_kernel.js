@@ -27,7 +27,7 @@ export class KernelWalker {
     this.model.send({ do: "stop", id: this.asked });
   }
 
-  told({ id, frames, share, whole, error, notes, failed }) {
+  told({ id, frames, share, whole, error, notes, finished, failed }) {
     if (id !== this.asked) return;
     if (failed) return this.reject(new Error(failed));
     const [track] = decode(frames ?? whole);
@@ -37,7 +37,7 @@ export class KernelWalker {
     else this.track.become(track);
     this.listener.grown(this.track, share ?? 1);
     if (!whole) return;
-    this.listener.done({ error, notes });
+    this.listener.done({ error, notes, finished });
     this.resolve();
   }
 

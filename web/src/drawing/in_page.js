@@ -19,7 +19,7 @@ export class PageWalker {
 
   /**
    * Walk along wish.path at wish.speed, from wish.start (-1: what suits the speed), by chance of wish.seed. Tells
-   * grown(track, share) again and again, and then done({error, notes}); fails with a plain sentence.
+   * grown(track, share) again and again, and then done({error, notes, finished}); fails with a plain sentence.
    */
   async walk(wish, { said, grown, done }) {
     this.stopped = false;
@@ -37,7 +37,7 @@ export class PageWalker {
       grown(walk.track, walk.share);
       await pause();
     } while (!walk.over && !this.stopped);
-    done({ error: wish.path.error(walk.track.ground(), fps), notes: this.notes(walk, wish) });
+    done({ error: wish.path.error(walk.track.ground(), fps), notes: this.notes(walk, wish), finished: walk.arrived });
   }
 
   stop() {
@@ -50,6 +50,7 @@ export class PageWalker {
     const found = (walk.share * path.length) / Math.max(seconds, 1e-9);
     const notes = [];
     if (walk.fellApart) notes.push(`it fell apart after ${seconds.toFixed(1)} s; take another seed`);
+    else if (walk.lost) notes.push(`lost the line after ${seconds.toFixed(1)} s: guided sampling alone does not always find back; try slower, or another seed`);
     else if (this.stopped && !walk.arrived) notes.push(`stopped after ${seconds.toFixed(1)} s`);
     else if (!walk.arrived) notes.push(`did not come to the end within ${seconds.toFixed(1)} s`);
     if (speed > walk.fastest) notes.push(`${speed} m/s is faster than anybody in the data; ${walk.fastest.toFixed(1)} m/s was asked for`);

@@ -13,6 +13,7 @@ const STANDING = 0.3; // m/s: who is slower goes where he faces
 const [RUN_UP, SAMPLES, AVERAGE] = [1.2, 6, 0.8]; // seconds, characters, seconds: see run_up.py
 const LEEWAY = 0.3; // seconds behind a timetable that are caught up with
 const [PATIENCE, MORE] = [2, 34]; // times the frames of the timetable, and some, after which nobody waits
+const LOST = 2; // metres from his path, from where nobody finds back
 const HASTE = 3; // deviations above the data's mean step: nobody is faster
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -107,10 +108,15 @@ export class GuidedWalk {
   get frame() { return this.dreamer.last; }
   get share() { return Math.min(this.steering.arc / this.path.length, 1); }
   get fellApart() { return this.dreamer.exploded > 0; }
+  get lost() {
+    const { x, z } = this.steering.place;
+    const [u, v] = this.path.at(this.steering.arc);
+    return Math.hypot(x - u, z - v) > LOST;
+  }
   get arrived() { return this.steering.arc >= this.path.length - 0.01; }
 
   /** Whether there is nothing more to do. */
-  get over() { return this.arrived || this.fellApart || this.frame >= this.longest; }
+  get over() { return this.arrived || this.fellApart || this.lost || this.frame >= this.longest; }
 
   /** Frames as far as they can be made in so many milliseconds. */
   reach(milliseconds = Infinity) {

@@ -27,7 +27,7 @@ class PathWidget(anywidget.AnyWidget):
     """A board to draw on, and who walks along what is drawn; web/src/drawing/ is the other side.
 
     The page sends {do: "walk", id, points, speed, start, seed} and {do: "stop"}. It is told, with the
-    same id: {frames, share} after each window, {whole, error, notes} at the end, or {failed}.
+    same id: {frames, share} after each window, {whole, error, notes, finished} at the end, or {failed}.
     """
 
     _esm = STATIC / "widget.js"
@@ -93,7 +93,8 @@ class PathWidget(anywidget.AnyWidget):
         else:
             error = record["error (cm)"]
             found = {"curve": error["rms"], "drawn": error["rms to the drawn line"]}
-            tell(whole=self._shown(motion), error=found, notes=list(record["notes"]))
+            told = {"notes": list(record["notes"]), "finished": bool(record["finished"])}
+            tell(whole=self._shown(motion), error=found, **told)
 
     def _shown(self, motion: Motion) -> dict[str, Any]:
         points = motion.positions().detach().cpu()
