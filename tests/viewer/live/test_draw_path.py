@@ -244,10 +244,10 @@ def test_models_that_can_not_be_led_are_refused(model, clips):
         ("circle", "solved path 1 is a str"),
         (("circle", CORNERS), "motionlab.design gives"),
         (("circle", CORNERS, "walk"), "circle.*no Motion"),
-        (("circle", [[0, 0], [np.nan, 1]], "clip"), "finite"),
+        (("circle", [[0, 0], [np.nan, 1]], "clip"), "circle.: Place 2"),
         (("circle", [[0, 0, 0]], "clip"), "shape"),
         (("circle", [[1, 1], [1, 1]], "clip"), "differ"),
-        (("circle", "abc", "clip"), "not numbers"),
+        (("circle", "abc", "clip"), "numbers"),
         (("circle", CORNERS, "slow"), "resample"),
     ],
 )

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
 from torch import nn
 
 from ...encodings import JointAngles
-from ...errors import ViewerError
+from ...errors import ViewerError, WayError
 from ...motion import Motion
+from ...paths import Path
 from ..pictures.palette import PATH
 from .dream_settings import Control, check_starts, sampled_tracks
 from .player import Track, payload
@@ -104,15 +104,10 @@ def _read(
 
 
 def _points(points: Any, where: str) -> list[list[float]]:
-    """Places [x, z]; those of a `Path` are its curve's."""
+    """Places [x, z]; those of a `Path` are its curve's, which may be a spline."""
+    if isinstance(points, Path):
+        return points.places.numpy().round(4).tolist()
     try:
-        line = np.asarray(getattr(points, "places", points), dtype=np.float64)
-    except (TypeError, ValueError, RuntimeError) as error:
-        raise ViewerError(f"{where}: its points are not numbers ({error}).") from error
-    if line.ndim != 2 or line.shape[1] != 2 or not np.isfinite(line).all():
-        raise ViewerError(
-            f"{where}: points of shape {line.shape}; give (n, 2), x and z, finite, in metres."
-        )
-    if not np.diff(line, axis=0).any():
-        raise ViewerError(f"{where}: a path needs two places that differ.")
-    return line.round(4).tolist()
+        return Path.through(points).drawn.numpy().round(4).tolist()
+    except WayError as error:
+        raise ViewerError(f"{where}: {error}") from error
