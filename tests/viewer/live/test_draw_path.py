@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import re
 import threading
+from functools import partial
 
 import numpy as np
 import pytest
 import torch
 from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
+import motionlab
 from motionlab.errors import SolverError, ViewerError
 from motionlab.paths import Path
 from motionlab.viewer import draw_path
@@ -60,8 +62,9 @@ def test_a_page_carries_network_choices_and_solved_paths(model, solved):
     first, second = content["solved"]
     assert first == {"name": "corners", "points": CORNERS, "speed": None, "start": None}
     assert second["speed"] == 4 and second["start"] == 1  # as fast as the slider goes
-    curve = Path.through(CORNERS, spline=True).places
+    curve = Path.through(CORNERS, spline=True).drawn
     np.testing.assert_allclose(second["points"], curve, atol=1e-3)
+    assert len(curve) > 100
     assert [track["frames"] for track in content["walks"]["tracks"]] == [40, 40]
     assert len(content["walks"]["bodies"]) == 1  # they share it
 
@@ -155,6 +158,19 @@ def test_walk_asks_design_and_shows_each_window(widget, design, clips):
     assert end["error"] == {"curve": 0.7, "drawn": 1.9}
     assert end["whole"]["tracks"][0]["name"].startswith("walk along a line")
     json.dumps(widget.told)  # it goes over the wire
+
+
+def test_motionlab_design_is_asked_as_it_wants_to_be(model):
+    """A short way, and a search that does little."""
+    widget = draw_path(model, partial(motionlab.design, steps=2, candidates=1))
+    widget.told, widget.send = [], lambda said: widget.told.append(said)
+    *windows, end = walked(widget, points=[[0, 0], [0, 2]], start=0)
+    assert sum(said["frames"]["frames"] for said in windows) == end["whole"]["frames"]
+    assert [said["share"] for said in windows] == sorted(said["share"] for said in windows)
+    assert end["error"]["curve"] >= 0
+    json.dumps(widget.told)
+    assert "leads nowhere" in walked(widget, points=[[0, 0]])[-1]["failed"]
+    assert "start '7'" in walked(widget, start=7)[-1]["failed"]
 
 
 def test_the_start_is_designs_choice_if_nobody_chose(widget, design):

@@ -104,10 +104,9 @@ def _read(
 
 
 def _points(points: Any, where: str) -> list[list[float]]:
-    """Places [x, z]; those of a `Path` are its curve's, which may be a spline."""
-    if isinstance(points, Path):
-        return points.places.numpy().round(4).tolist()
+    """Places [x, z] of the line as it was drawn: the page rounds its corners anew."""
     try:
-        return Path.through(points).drawn.numpy().round(4).tolist()
+        path = points if isinstance(points, Path) else Path.through(points)
     except WayError as error:
         raise ViewerError(f"{where}: {error}") from error
+    return path.drawn.numpy().round(4).tolist()
