@@ -33,7 +33,7 @@ def drop_buttons_without_repository(app: Sphinx, config) -> None:
 def add_player(app: Sphinx, pagename, templatename, context, doctree) -> None:
     """Load the one player script on the pages that hold a player."""
     body = context.get("body", "")
-    if "motionlab-player" in body or "motionlab-dream" in body:
+    if any(f"motionlab-{kind}" in body for kind in ("player", "dream", "path")):
         app.add_js_file("motionlab-player.js", loading_method="defer")
 
 

@@ -5,8 +5,8 @@
 Each page is opened from disk and from a local server, on a desktop and on a phone. It fails if a
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
 if a formula stays TeX; if a player stands still, does not follow its slider or saves nothing; if a
-scene stays empty or does not follow its own; if a network does not load and move, or too slowly. It
-waits as long as a busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
+scene stays empty or does not follow its own; if a network does not load and move, or too slowly; if a
+path that is drawn is not walked. It waits as long as a busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
 PATH (or its path in CHROMIUM).
 """
 
@@ -37,6 +37,13 @@ FLAGS = [  # WebGL in software: the machine that checks may have no graphics car
     "--enable-unsafe-swiftshader",
 ]
 PLAYER, SCENE, DREAM = ".motionlab-player", ".motionlab-scene iframe", ".motionlab-dream"
+PATH = ".motionlab-path"
+STROKE = (
+    (0.25, 0.75),
+    (0.35, 0.3),
+    (0.6, 0.6),
+    (0.75, 0.25),
+)  # shares of a board's width and height
 WEIGHTS_BYTES = 8e6  # of a network that a page loads on a click
 STEP = 1000 / 30  # milliseconds that a network may take for a frame
 CONTRAST = 40  # of 255 levels of grey: less between the darkest and the lightest is nothing drawn
@@ -212,6 +219,37 @@ class Visit:
         if size > WEIGHTS_BYTES:
             self.trouble(f"{name} weighs {size / 1e6:.1f} MB")
 
+    def check_paths(self) -> None:
+        for number in range(self.page.locator(PATH).count()):
+            self._check_path(number)
+
+    def _check_path(self, number: int) -> None:
+        """Draw a line with the mouse, let it be walked, and look for how far from it that was."""
+        figure = self.page.locator(PATH).nth(number)
+        name = f"path {number + 1}"
+        figure.scroll_into_view_if_needed()
+        try:
+            board = figure.locator("svg[role=application]")
+            board.scroll_into_view_if_needed(timeout=PATIENCE)
+            box = board.bounding_box()
+            for step, (x, y) in enumerate(STROKE):
+                place = box["x"] + x * box["width"], box["y"] + y * box["height"]
+                self.page.mouse.move(*place, steps=8)
+                if step == 0:
+                    self.page.mouse.down()
+            self.page.mouse.up()
+            figure.get_by_role("button", name="Walk").click(timeout=PATIENCE)
+            figure.and_(self.page.locator("[data-walked]")).wait_for(timeout=3 * PATIENCE)
+            frame = functools.partial(figure.evaluate, "f => f.motionlab.player.frame")
+            before = frame()
+            if not self._until(lambda: frame() != before):
+                self.trouble(f"{name}: who walks does not move")
+            if " cm from the line" not in (told := figure.inner_text()):
+                self.trouble(f"{name} does not say how far from the line it went: {told}")
+        except TimeoutError:
+            said = figure.locator("[aria-live=polite]").all_inner_texts()
+            self.trouble(f"{name} is not walked: {' '.join(said)}")
+
     def _until(self, done: Callable[[], bool]) -> bool:
         """Whether it was done in time: drawing in software may take its while."""
         end = time.monotonic() + PATIENCE / 1000
@@ -291,6 +329,7 @@ def check_page(window: BrowserContext, base: str, path: Path, folder: Path) -> l
         visit.check_players()
         visit.check_scenes()
         visit.check_dreams()
+        visit.check_paths()
     weight = own_weight(visit.loaded, base, folder)
     if weight > PAGE_BYTES:
         visit.trouble(f"weighs {weight / 1e6:.1f} MB, allowed {PAGE_BYTES / 1e6} MB")

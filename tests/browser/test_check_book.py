@@ -37,6 +37,20 @@ FAULTS = {
         "document.currentScript.parentElement.motionlab = {live: {}, player: {frame: 99}, dreamer: "
         "{advance() { for (const t = Date.now() + 60; Date.now() < t; ); }}}</script></figure>"
     ),
+    "path 1 is not walked: nothing beside": (
+        '<figure class="motionlab-path"><svg role="application" width="99" height="99"></svg>'
+        '<button>Walk</button><p aria-live="polite">nothing beside this page</p></figure>'
+    ),
+    "path 1: who walks does not move": (
+        '<figure class="motionlab-path" data-walked><svg role="application" width="99" height="99">'
+        "</svg><button>Walk</button><script>document.currentScript.parentElement.motionlab = "
+        "{player: {frame: 3}}</script></figure>"
+    ),
+    "path 1 does not say how far": (
+        '<figure class="motionlab-path" data-walked><svg role="application" width="99" height="99">'
+        "</svg><button>Walk</button><script>document.currentScript.parentElement.motionlab = "
+        "{player: {get frame() { return Date.now(); }}}</script></figure>"
+    ),
     "scene 1 did not start": scene("The script of this scene is missing beside the page."),
     "scene 1 draws nothing": scene("<canvas></canvas>"),
     "scene 1 shows the same picture": scene("<canvas width=50 style='background: black'></canvas>"),

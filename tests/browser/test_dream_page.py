@@ -11,7 +11,8 @@ from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
 from motionlab.encodings import JointAngles, Normalizer, RootRelative
 from motionlab.models import AcLstm, LstmGmm
-from motionlab.viewer.live.dream_page import Dream, page_figure
+from motionlab.viewer.live.dream_page import page_figure
+from motionlab.viewer.live.network_figure import NetworkFigure
 from motionlab.viewer.live.network_weights import as_in_browser, weights_script
 from motionlab.viewer.live.player import bundle_path
 
@@ -53,7 +54,9 @@ def folder(model, dancer, tmp_path_factory):
     figure.save(folder / "alone.html")
     exact = weights_script(model, "exact", rounded=False)
     live = figure.content["live"] | {"name": exact.name}
-    Dream(figure.content | {"live": live}, exact, figure.still, None).save(folder / "exact.html")
+    NetworkFigure(figure.content | {"live": live}, exact, figure.still, None).save(
+        folder / "exact.html"
+    )
     page_figure(dancer, seconds=1, height=200).save(folder / "dancer.html")
     return folder
 

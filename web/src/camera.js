@@ -33,6 +33,11 @@ export class Orbit {
     this.controls.update();
   }
 
+  /** Metres from where it stands to where it looks. */
+  get distance() {
+    return this.eye.position.distanceTo(this.controls.target);
+  }
+
   /** Turn by keyboard, radians; or come closer by a factor. */
   turn(azimuth, polar, closer = 1) {
     const { target } = this.controls;

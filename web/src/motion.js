@@ -149,19 +149,59 @@ export class Track {
     return far([x, z]) < 0.5 ? [0, 1] : [x - x0, z - z0];
   }
 
+  /** How many frames of the motion there are. */
+  get count() {
+    return (this.stored - 1) * this.stride + 1;
+  }
+
+  /** Places [x, z] of the middle in all stored frames, metres as they are. */
+  ground() {
+    return Array.from({ length: this.stored }, (_, stored) => this.onGround(stored * this.stride));
+  }
+
+  onGround(frame) {
+    const stored = Math.min(Math.max(Math.round(frame / this.stride), 0), this.stored - 1);
+    return [this.root[3 * stored] / this.magnified, this.root[3 * stored + 2] / this.magnified];
+  }
+
   /** Corners [min x, min z, max x, max z] of the ground that the root covers. */
   get extent() {
-    if (this.box) return this.box;
-    const box = [Infinity, Infinity, -Infinity, -Infinity];
-    for (let i = 0; i < this.root.length; i += 3) {
-      const [x, z] = [this.root[i], this.root[i + 2]];
-      box[0] = Math.min(box[0], x);
-      box[1] = Math.min(box[1], z);
-      box[2] = Math.max(box[2], x);
-      box[3] = Math.max(box[3], z);
-    }
-    return (this.box = box);
+    return (this.box ??= boxAround(Array.from({ length: this.stored }, (_, i) => [this.root[3 * i], this.root[3 * i + 2]])));
   }
+
+  /** The frames of another track, of the same body, come behind its own. */
+  extend(other) {
+    this.become({ ...Object.fromEntries(PARTS.map((part) => [part, joined(this[part], other[part])])), stored: this.stored + other.stored });
+  }
+
+  /** Be another motion of the same body. */
+  become(other) {
+    for (const part of [...PARTS, "stored"]) this[part] = other[part];
+    this.box = undefined;
+    this.way = smoothCourse(this, this.rate * this.stride);
+  }
+}
+
+const PARTS = ["angles", "root", "local", "contacts"]; // of a track, numbers frame by frame
+
+function joined(some, more) {
+  if (!some || !more) return null;
+  const all = new some.constructor(some.length + more.length);
+  all.set(some);
+  all.set(more, some.length);
+  return all;
+}
+
+/** Corners [min x, min z, max x, max z] around places [x, z]. */
+export function boxAround(places) {
+  const box = [Infinity, Infinity, -Infinity, -Infinity];
+  for (const [x, z] of places) {
+    box[0] = Math.min(box[0], x);
+    box[1] = Math.min(box[1], z);
+    box[2] = Math.max(box[2], x);
+    box[3] = Math.max(box[3], z);
+  }
+  return box;
 }
 
 /** Running mean of a track's root on the floor: x, z per stored frame. No lag, same in any order. */

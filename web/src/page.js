@@ -1,8 +1,9 @@
 // Entry of the script for built pages: brings every figure that Python wrote to life.
+import { PathFigure } from "./drawing/figure.js";
 import { Dream } from "./network/dream.js";
 import { Player } from "./player.js";
 
-const KINDS = { "motionlab-player": Player, "motionlab-dream": Dream };
+const KINDS = { "motionlab-player": Player, "motionlab-dream": Dream, "motionlab-path": PathFigure };
 
 function mount(figure, Kind) {
   const data = figure.querySelector('script[type="application/json"]');

@@ -1,14 +1,28 @@
-// Entry of the Jupyter widget: ties the player to the traits of motionlab.viewer.Player.
+// Entry of the Jupyter widgets: ties the player to the traits of motionlab.viewer.Player, and the board to draw on
+// to the kernel that solves a path.
+import { PathFigure } from "./drawing/figure.js";
+import { KernelWalker } from "./drawing/in_kernel.js";
 import { Player } from "./player.js";
 
 const SHARED = ["playing", "speed", "follow", "overlay", "chosen"];
 const SAVE_EVERY = 200; // milliseconds: while it plays the kernel hears of the frame five times a second
 
-function render({ model, el }) {
+function hostIn(el) {
   const host = document.createElement("div");
   // JupyterLab has its own use for arrows and space; it looks for this mark from the focused element upwards.
   host.dataset.lmSuppressShortcuts = "";
   el.append(host);
+  return host;
+}
+
+function caption(model) {
+  const text = document.createElement("figcaption");
+  text.textContent = model.get("caption");
+  return text.textContent ? [text] : [];
+}
+
+function renderPlayer({ model, el }) {
+  const host = hostIn(el);
   let player;
   let saved = 0;
 
@@ -33,9 +47,7 @@ function render({ model, el }) {
     for (const name of SHARED) player.set(name, model.get(name));
     player.setFrame(model.get("frame"));
     if (reduced) player.pause();
-    const caption = document.createElement("figcaption");
-    caption.textContent = model.get("caption");
-    if (caption.textContent) host.append(caption);
+    host.append(...caption(model));
     el.motionlab = host.motionlab = player;
   };
   build();
@@ -54,4 +66,12 @@ function render({ model, el }) {
   };
 }
 
-export default { render };
+function renderPath({ model, el }) {
+  const host = hostIn(el);
+  const figure = new PathFigure(host, model.get("content"), null, new KernelWalker(model));
+  host.append(...caption(model));
+  el.motionlab = host.motionlab = figure;
+  return () => figure.dispose();
+}
+
+export default { render: (view) => (view.model.get("kind") === "path" ? renderPath(view) : renderPlayer(view)) };

@@ -2,6 +2,7 @@
 
 from importlib import import_module
 
+from .live.draw_path import draw_path
 from .live.dream import dream
 from .live.feeding import feeding
 from .live.knobs import knobs
@@ -17,6 +18,7 @@ _LATER = {
 __all__ = [
     "Player",
     "bundle_path",
+    "draw_path",
     "dream",
     "feeding",
     "filmstrip",

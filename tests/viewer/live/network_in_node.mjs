@@ -1,8 +1,12 @@
-// Runs web/src/network/ as a page would, for test_dream.py: answers the questions in a JSON file.
+// Runs web/src/network/ as a page would, for network_in_node.py: answers the questions in a JSON file.
 import { readFileSync } from "node:fs";
+import { smoothed } from "../../../web/src/drawing/shapes.js";
+import { decode } from "../../../web/src/motion.js";
 import { Dreamer } from "../../../web/src/network/dreamer.js";
+import { guide, GuidedWalk, pickStart, recently, Steering, wanted } from "../../../web/src/network/guided.js";
 import { LstmGmm } from "../../../web/src/network/lstm_gmm.js";
 import { Random } from "../../../web/src/network/mixture.js";
+import { Path } from "../../../web/src/network/path.js";
 import { readWeights } from "../../../web/src/network/weights.js";
 
 const { scripts, look, ask } = JSON.parse(readFileSync(process.argv[2], "utf8"));
@@ -55,6 +59,73 @@ const answers = {
     dreamer.characters[0].next.means.fill(NaN);
     for (let frame = 0; frame < 2; frame++) dreamer.advance();
     return { exploded: dreamer.exploded, points: list(dreamer.tracks[0].room(2)) };
+  },
+
+  /** A drawn line as a curve to walk: places, timetable, places at arcs, arcs near points, errors of roots. */
+  path({ points, corner, speed, fastest, fps, arcs, near, root }) {
+    const path = new Path(points, corner);
+    return {
+      drawn: path.drawn,
+      places: path.places,
+      crossings: path.crossings,
+      table: path.timetable(speed, fastest, fps),
+      at: arcs.map((arc) => path.at(arc)),
+      nearest: near.map(({ point, first, last }) => path.nearest(point, first, last)),
+      error: path.error(root, fps),
+    };
+  },
+
+  /** Rows that guided sampling draws along a path with given noise (frames, characters, kept), and where they lead. */
+  guided({ name, start, points, dues, place, arc, noise, change }) {
+    const dreamer = new Dreamer(weights(name), look, { ...settings, ...change, start, characters: noise[0].length });
+    const path = new Path(points);
+    const steerings = dreamer.tracks.map((track) => new Steering(path, dreamer.fps, place, arc, [track.at(0).row]));
+    const [rows, arcs] = [[], []];
+    let last = arc;
+    dues.forEach((due, t) => {
+      dreamer.characters.forEach((character, k) => {
+        const left = [...noise[t][k]];
+        character.random = { uniform: () => 0.5, normal: () => left.shift() };
+      });
+      guide(dreamer, steerings, steerings.map((steering) => wanted(due, last, steering.arc, dreamer.fps)));
+      last = due;
+      rows.push(dreamer.tracks.map((track) => list(track.at(t + 1).row)));
+      arcs.push(steerings.map((steering) => steering.arc));
+    });
+    return { rows, arcs, places: steerings.map(({ place: { x, z, yaw } }) => [x, z, yaw]) };
+  },
+
+  /** What a hand drew, as the line that was meant. */
+  smoothed({ stroke }) {
+    return smoothed(stroke);
+  },
+
+  /** A track that grew from pieces, and one that became another. */
+  grown({ pieces, whole }) {
+    const [[track], ...others] = pieces.map(decode);
+    for (const [other] of others) track.extend(other);
+    const told = ({ root, local, angles, contacts, way, count, extent }) => ({ root: list(root), local: list(local), angles: list(angles), contacts: list(contacts), way, count, extent });
+    const grown = told(track);
+    track.become(decode(whole)[0]);
+    return { grown, become: told(track), whole: told(decode(whole)[0]) };
+  },
+
+  recently({ rows, fps }) {
+    return recently(rows, fps);
+  },
+
+  /** Whole walks along a line, one for each seed. */
+  walks({ name, points, speed, seeds, change }) {
+    return seeds.map((seed) => {
+      const path = new Path(points);
+      const read = weights(name);
+      const start = pickStart(read.starts, speed, read.fps);
+      const walk = new GuidedWalk(read, look, { ...settings, ...change, start, seed, speed }, path);
+      walk.reach();
+      const root = Array.from({ length: walk.frame + 1 }, (_, frame) => list(walk.track.at(frame).points.slice(0, 3)));
+      const { arrived, fellApart, lost, frame } = walk;
+      return { start, arrived, fellApart, lost, frame, root, error: path.error(root.map(([x, , z]) => [x, z]), read.fps) };
+    });
   },
 
   /** Frames of one mixture, drawn one after the other, and the noise that the last one leaves. */

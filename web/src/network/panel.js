@@ -26,7 +26,7 @@ export class Panel {
 }
 
 /** A label, its control, and its value. */
-function field(control, starts, change) {
+export function field(control, starts, change) {
   const { name, label, help, min, max, step, value } = control;
   const box = make("label", "ml-field");
   box.title = help;
@@ -35,7 +35,7 @@ function field(control, starts, change) {
   let input;
   if (name === "start") {
     input = make("select", "ml-choice");
-    starts.forEach((start, i) => input.add(new Option(start, i)));
+    starts.forEach((start, i) => input.add(new Option(start, min + i)));
   } else {
     input = make("input", name === "seed" ? "ml-choice" : "ml-range");
     Object.assign(input, { type: name === "seed" ? "number" : "range", min, max, step });
@@ -53,7 +53,7 @@ function field(control, starts, change) {
 }
 
 /** Where the weights come from, on demand. */
-function provenance(facts) {
+export function provenance(facts) {
   const details = make("details", "ml-facts");
   const list = make("dl", "");
   for (const [name, value] of facts) list.append(make("dt", "", name), make("dd", "", value));
