@@ -1,5 +1,7 @@
 """Poses that nobody holds are seen, and those of people are not called so."""
 
+from dataclasses import replace
+
 import pytest
 import roma
 import torch
@@ -37,6 +39,15 @@ def test_gaits_are_whole(gait):
 def test_a_joint_turned_about_is_seen_where_it_is(gait, joint, axis):
     found = broken_frames(turned(gait, joint, axis, slice(5, 8)))
     assert found[5:8].all() and found.sum() == 3
+
+
+def test_a_body_in_the_air_is_seen_and_a_larger_one_is_none(gait):
+    raised = gait.root_positions + torch.tensor([0.0, 0.3, 0.0])
+    lifted = Motion(gait.skeleton, raised, gait.rotations, gait.fps)
+    assert broken_frames(lifted).all()
+    body = gait.skeleton
+    larger = replace(body, offsets=1.3 * body.offsets, end_offsets=1.3 * body.end_offsets)
+    assert not broken_frames(Motion(larger, raised, gait.rotations, gait.fps)).any()
 
 
 def test_features_of_a_batch_are_judged_each_by_itself(gait):

@@ -16,17 +16,20 @@ from ..encodings import JointAngles
 from ..encodings.base import drawn_as_canonical
 from ..errors import MetricError
 from ..motion import Motion
+from ..skeleton import Skeleton
 
+_HEIGHT = 3  # the channel of it
 _FILE = Path(__file__).with_name("pose_ranges.json")  # experiments/data/fit_pose_ranges.py
 
 
 def broken_frames(motion: Motion) -> Tensor:
     """Whether a body holds a pose beyond those of the training data, bool (frames,).
 
-    Beyond means: the tilt of the root, or one of the three numbers of a joint (its
+    Beyond means: the height of the root, its tilt, or one of the three numbers of a joint (its
     rotation vector from the mean pose), lies farther outside the range that it has in the training
     split of `locomotion` than any does in the validation split. Recorded motion that lies there is
-    not broken; it is another than walking, running and turning.
+    not broken; it is another than walking, running and turning. Of bodies with other legs the height
+    is not judged.
 
     Raises
     ------
@@ -47,20 +50,23 @@ def knows(encoding: JointAngles) -> bool:
 
 
 def beyond(encoding: JointAngles, features: Tensor) -> Tensor:
-    """By how many radians (..., frames) features (..., frames, dim) lie beyond; else below 0.
+    """By how much (..., frames), radians or metres, features (..., frames, dim) lie beyond; else below 0.
 
     encoding : one that this module `knows`.
     """
-    last = encoding.slices["pose"].stop
-    body = features[..., last - len(_ranges()[0]) : last]
-    low, high = (edge.to(body) for edge in _ranges())
+    first = _HEIGHT if encoding.skeleton.matches(Skeleton.canonical()) else _HEIGHT + 1
+    body = features[..., first : encoding.slices["pose"].stop]
+    low, high = (edge[first - _HEIGHT :].to(body) for edge in _ranges())
     return torch.maximum(low - body, body - high).amax(-1)
 
 
 @cache
 def _ranges() -> tuple[Tensor, Tensor]:
-    """Least and largest value of each channel from the tilt on, the margin included."""
+    """Least and largest value of each channel from the height on, the margins included."""
     found = json.loads(_FILE.read_text(encoding="utf-8"))
     with torch.inference_mode(False):
         low, high = torch.tensor(list(found["ranges"].values())).unbind(1)
-        return low - found["margin"], high + found["margin"]
+        height, turns = found["margins"]
+        margins = torch.full_like(low, turns)
+        margins[0] = height
+        return low - margins, high + margins
