@@ -36,7 +36,7 @@ def calm(seed=0):
 
 def beginning(model, paths, paces=None):
     paces = paces or [1.2] * len(paths)
-    return run_up(model, [0] * len(paths), paths, paces, calm())
+    return run_up(model, model.starts[[0] * len(paths)], paths, paces, calm())
 
 
 BENT = Path.through([[0, 0], [0, 0.7], [0.5, 1.1]])
@@ -271,7 +271,7 @@ def test_a_start_is_picked_by_name_and_speed(walker):
 
 def test_the_run_up_leads_onto_the_path(walker):
     paths = [BENT, STRAIGHT, Path.through([[0, 0], [-2, -2]])]
-    before = run_up(walker, [0, 0, 0], paths, [1.2] * 3, calm())
+    before = run_up(walker, walker.starts[[0, 0, 0]], paths, [1.2] * 3, calm())
     assert isinstance(before, Before) and before.place.shape == (3, 3)
     for path, place in zip(paths, before.place, strict=True):
         torch.testing.assert_close(place[:2], path.places[0])

@@ -8,7 +8,7 @@ import torch
 import motionlab
 from motionlab.__main__ import main
 from motionlab.datasets import gaits
-from motionlab.errors import MotionLabError, SolverError, WayError
+from motionlab.errors import EncodingError, MotionLabError, SolverError, WayError
 from motionlab.models import Refiner
 from motionlab.paths import Path
 from motionlab.solvers.design import design_all, enlarged, fastest_of
@@ -49,6 +49,17 @@ def test_what_no_one_can_do_is_told_by_how_much_and_where(model):
         assert motion.positions().isfinite().all()
         far = record["error (cm)"]["largest"] > 5
         assert far == any("from the drawn line, at" in note for note in record["notes"])
+
+
+def test_it_begins_with_what_a_motion_ends_with(model):
+    clip = gaits.make(seconds=2, speed=1.2)
+    motion, record = motionlab.design(CORNER, model=model, start=clip, **QUICK)
+    assert record["start"] == "a motion" and motion.positions().isfinite().all()
+    assert motion.root_positions[0, [0, 2]].tolist() == pytest.approx([1, 1], abs=1e-4)
+    other, _ = motionlab.design(CORNER, model=model, start=clip[:20], **QUICK)
+    assert len(other) != len(motion) or not torch.equal(other.rotations, motion.rotations)
+    with pytest.raises(EncodingError, match="resample"):
+        motionlab.design(CORNER, model=model, start=gaits.make(seconds=1, fps=60), **QUICK)
 
 
 def test_a_refiner_moves_the_body_and_not_its_way(model):

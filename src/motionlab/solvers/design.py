@@ -28,7 +28,7 @@ from ..motion import Motion
 from ..paths import CORNER, Curves, Path
 from ..weights import load
 from .path_control import Followed, follow
-from .run_up import pick_start, run_up
+from .run_up import begin_with, run_up
 from .windows import News
 
 STRIDE = 1.1  # seconds, of a walk
@@ -40,7 +40,7 @@ FAR, LATE, SLOWER = 0.05, 0.5, 0.15  # m, s, share of the speed: what is told
 def design(
     points: Tensor | Sequence | Path,
     speed: float | None = None,
-    start: str | int | None = None,
+    start: str | int | Motion | None = None,
     model: str | nn.Module = "lstm-gmm-contacts",
     *,
     times: Tensor | Sequence | None = None,
@@ -60,7 +60,8 @@ def design(
     points : (n, 2) metres, x and z: corners of a line, or places of a curve. Or a `Path`.
     speed : m/s, less in sharp bends; 1.2 if nothing is said. Not with times.
     start : what the character does when the path begins: number or beginning of the name of one of
-        the model's starts, such as "run". None: what suits the speed.
+        the model's starts, such as "run"; or a motion on its body at its rate, whose end it has just
+        done. None: what suits the speed.
     model : name of shipped weights, or a model as `motionlab.load` gives it.
     times : (n,) seconds at which to be at the points, rising; the motion lasts from the first to the
         last.
@@ -84,6 +85,7 @@ def design(
     ------
     WayError : no path, or times that go back.
     SolverError : a speed that is none, no such start, a model or a refiner that can't do it.
+    EncodingError : a motion to start with that has another skeleton or rate.
     ModelError : there are no such weights.
     """
     path = points if isinstance(points, Path) else Path.through(points, times, spline, corner)
@@ -95,7 +97,7 @@ def design(
 def design_all(
     paths: Sequence[Path],
     speed: float | None = None,
-    start: str | int | None = None,
+    start: str | int | Motion | None = None,
     model: str | nn.Module = "lstm-gmm-contacts",
     *,
     refiner: nn.Module | None = None,
@@ -115,21 +117,23 @@ def design_all(
     fastest = fastest_of(model)
     tables = [path.timetable(speed, fastest, model.fps) for path in paths]
     paces = [_pace(table, model.fps) for table in tables]
-    starts = [pick_start(model, start, pace) for pace in paces]
+    begun, names = begin_with(model, start, paces)
     sampling = getattr(model, "sampling", {})
     chance = Chance(torch.Generator().manual_seed(seed), **sampling)
-    before = run_up(model, starts, paths, paces, chance)
+    before = run_up(model, begun, paths, paces, chance)
     seen = None if watch is None else _shown(model, watch)
     found = follow(
         model, paths, before, tables, fastest=fastest, chance=chance, watch=seen, progress=progress,
         **settings,
     )  # fmt: skip
     made = []
-    for path, walked, number, table in zip(paths, found, starts, tables, strict=True):
-        motion = _motion(model, walked, refiner, lock, f"path {path.length:.1f} m", name)
-        record = recorded(motion, path, table, speed, fastest, walked)
-        record["start"] = (getattr(model, "start_names", ()) or ("",) * (number + 1))[number]
-        made.append((motion, record))
+    for path, walked, begin, table in zip(paths, found, names, tables, strict=True):
+        motion = model.encoding.to_motion(
+            walked.features, walked.place, f"path {path.length:.1f} m", name
+        )
+        motion = finished(motion, refiner, lock)
+        made.append((motion, recorded(motion, path, table, speed, fastest, walked)))
+        made[-1][1]["start"] = begin
     return made
 
 
@@ -143,6 +147,29 @@ def _shown(model: LstmGmm, watch: Callable[[int, Motion, float], None]) -> Calla
         begun.add(news.path)
 
     return seen
+
+
+@torch.no_grad()
+def finished(motion: Motion, refiner: Refiner | None = None, lock: bool = False) -> Motion:
+    """A motion as `design` gives it: its body refined, its toes held still while they are in contact.
+
+    The refiner knows of no path and would leave it by some millimetres a step: the root stays over the
+    way it has. A lock lowers the root at most.
+    """
+    if refiner is not None:
+        encoding = refiner.encoding
+        body = encoding.to_motion(
+            refiner(encoding.encode(motion)[None])[0], encoding.start_of(motion), motion.name,
+            motion.source,
+        )  # fmt: skip
+        root = motion.root_positions.clone()
+        root[:, 1] = body.root_positions[:, 1]
+        motion = replace(body, root_positions=root)
+    if lock:
+        found = label(motion)  # the network tells a frame late now and then, the refiner another
+        found = found if motion.contacts is None else found | motion.contacts
+        motion = lock_feet(motion, found, floor=None)
+    return motion
 
 
 def fastest_of(model: LstmGmm) -> float:
@@ -278,8 +305,6 @@ def _checked(model: nn.Module, refiner: nn.Module | None) -> LstmGmm:
             f"A path is followed by an LstmGmm on JointAngles, such as lstm-gmm-contacts; this is "
             f"{type(model).__name__}."
         )
-    if getattr(model, "starts", None) is None:
-        raise SolverError("The model has no starts to begin with; take one from motionlab.load.")
     if refiner is not None and not isinstance(refiner, Refiner):
         raise SolverError(f"refiner is {type(refiner).__name__}; load one, as refiner-contacts.")
     if refiner is not None and refiner.encoding.config() != model.encoding.config():
@@ -300,22 +325,3 @@ def _pace(table: Tensor, fps: float) -> float:
     """Metres a second that a timetable begins with."""
     some = min(len(table) - 1, round(fps / 2))
     return float(table[some] - table[0]) * fps / some
-
-
-def _motion(
-    model: LstmGmm, walked: Followed, refiner: Refiner | None, lock: bool, name: str, source: str
-) -> Motion:
-    features = walked.features
-    if refiner is not None:
-        with torch.no_grad():
-            features = refiner(features[None])[0]
-    motion = model.encoding.to_motion(features, walked.place, name, source)
-    if refiner is not None:  # which knows of no path, and leaves it by some millimetres a step
-        way = model.encoding.root_path(walked.features, walked.place)
-        height = motion.root_positions[:, 1]
-        motion = replace(motion, root_positions=torch.stack([way[:, 0], height, way[:, 2]], 1))
-    if lock:
-        found = label(motion)  # the network tells a frame late now and then, the refiner another
-        found = found if motion.contacts is None else found | motion.contacts
-        motion = lock_feet(motion, found, floor=None)
-    return motion

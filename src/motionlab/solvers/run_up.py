@@ -10,8 +10,9 @@ import torch
 from torch import Tensor
 
 from ..errors import SolverError
-from ..models import LstmGmm
+from ..models import LstmGmm, State
 from ..models.sampler import Chance
+from ..motion import Motion
 from ..paths import Curves, Path
 from .energy import Before
 from .guided import Steering, guided, recently
@@ -57,24 +58,43 @@ def pick_start(model: LstmGmm, start: str | int | None, pace: float) -> int:
     return min(chosen, key=lambda i: abs(speed(i) - pace))
 
 
+def begin_with(
+    model: LstmGmm, start: str | int | Motion | None, paces: Sequence[float]
+) -> tuple[State, list[str]]:
+    """States (n) that paths at some paces (n) begin with, and what they are called.
+
+    start : as of `pick_start`; or a motion, whose end it is.
+    """
+    if isinstance(start, Motion):
+        state = model.observe(model.encoding.encode(start))
+        return state[[0] * len(paces)], [start.name or "a motion"] * len(paces)
+    if getattr(model, "starts", None) is None:
+        raise SolverError(
+            "The model has no starts to begin with; give a motion as start=, or take a model from "
+            "motionlab.load."
+        )
+    chosen = [pick_start(model, start, pace) for pace in paces]
+    names = getattr(model, "start_names", ()) or [""] * len(model.starts.frame)
+    return model.starts[chosen], [names[i] for i in chosen]
+
+
 @torch.no_grad()
 def run_up(
-    model: LstmGmm, starts: Sequence[int], paths: Sequence[Path], paces: Sequence[float],
-    chance: Chance,
-) -> Before:  # fmt: skip
+    model: LstmGmm, begun: State, paths: Sequence[Path], paces: Sequence[float], chance: Chance
+) -> Before:
     """The frame before each path's first step, at its beginning, on the way it leads.
 
-    From each start a few characters walk straight ahead for a stride, guided to the pace; the one who
+    From each state a few characters walk straight ahead for a stride, guided to the pace; the one who
     keeps it best is taken, and put down so that he has been going where the path goes.
 
     Parameters
     ----------
-    model : on `JointAngles`, with `starts`.
-    starts : (n), numbers of starts; paths : (n); paces : (n), m/s.
+    model : on `JointAngles`.
+    begun : states (n) of the characters; paths : (n); paces : (n), m/s.
     """
     straight, frames = Curves([Path.through([[0, 0], [0, 100]])]), round(SECONDS * model.fps)
     many = torch.arange(len(paths)).repeat_interleave(SAMPLES)
-    state = model.starts[[starts[i] for i in many.tolist()]]
+    state = begun[many]
     nowhere = torch.zeros(len(many), 3, dtype=torch.float64)
     pace = torch.tensor(paces, dtype=torch.float64)[many, None]
     steering = Steering.after(
