@@ -14,8 +14,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,12 +23,13 @@ from torch import Tensor, nn
 
 import motionlab
 from motionlab import Motion, Skeleton, metrics
-from motionlab.encodings import JointAngles
 from motionlab.feet import contacts
+from motionlab.metrics import broken_frames
 from motionlab.models import pfnn
+from motionlab.motion import concatenate
 from motionlab.paths import Path as Way
 from motionlab.paths import Piece
-from motionlab.solvers import design, lock_feet
+from motionlab.solvers import design
 from motionlab.solvers.design import SETTLED, STRIDE
 from motionlab.training import Prepared
 from motionlab.weights import find
@@ -42,9 +42,7 @@ from .refined_samples import Variant, asked, clips_of
 NAME = "lstm-gmm-contacts"
 OURS, REFINED = "ours", "ours, refined and locked"
 AUTHORS, TRAINED = "PFNN, the authors'", "PFNN, trained here"
-HEIGHT = 3  # of the root, among the features
 LED = 4  # times that PFNN is led anew, faster or slower, towards the same mean speed
-BEYOND = (0.02, 0.1)  # m and rad beyond the training clips' range: a root's height, a pose; broken
 FASTEST = 1.6  # times the speed that is wanted: beyond, PFNN is asked for another gait
 
 
@@ -100,24 +98,16 @@ def of_gait(
     seeds: Sequence[int], runs: Path,
 ) -> dict:  # fmt: skip
     """All curves by all methods, in one gait."""
-    drawn, bounds = curves_of(gait), Range.of(data)
-    ways = {name: Way.through(curve) for name, curve in drawn.items()}
-    raw = [
-        kept(
-            runs / f"{gait}-{seed}.pt",
-            lambda seed=seed: walked(gait, model, data, "test", ways, seed),
-        )
+    ways = {name: Way.through(curve) for name, curve in curves_of(gait).items()}
+    found = [
+        kept(runs / f"{gait}-{seed}.pt",
+             lambda seed=seed: walked(gait, model, refiner, data, "test", ways, seed))
         for seed in seeds
-    ]
-    solved = {OURS: raw, REFINED: [finished(each, model, refiner) for each in raw]}
+    ]  # fmt: skip
+    solved = {method: [each[method] for each in found] for method in (OURS, REFINED)}
     rows = {
         method: {
-            name: [
-                row_of(each[name][0], way)
-                | each[name][1]
-                | {"broken frames": bounds.broken(each[name][0])}
-                for each in found
-            ]
+            name: [row_of(each[name][0], way) | each[name][1] for each in found]
             for name, way in ways.items()
         }
         for method, found in solved.items()
@@ -130,8 +120,9 @@ def of_gait(
             for name, way in ways.items()
         }
     few = {name: way for name, way in ways.items() if not name.startswith("spline")}
-    learnt = kept(runs / f"{gait}-val.pt", lambda: walked(gait, model, data, "val", few, 0))
-    learnt = {OURS: learnt, REFINED: finished(learnt, model, refiner)}
+    learnt = kept(
+        runs / f"{gait}-val.pt", lambda: walked(gait, model, refiner, data, "val", few, 0)
+    )
     return {
         "speed asked (m/s)": GAITS[gait].speed,
         "curves": rows,
@@ -147,32 +138,27 @@ Solved = dict[str, tuple[Motion, dict]]  # by the name of the curve
 
 
 def walked(
-    gait: str, model: nn.Module, data: Prepared, split: str, ways: dict[str, Way], seed: int
-) -> Solved:
-    """Ours along all curves, begun in held-out motion, as the search leaves it."""
+    gait: str, model: nn.Module, refiner: nn.Module, data: Prepared, split: str,
+    ways: dict[str, Way], seed: int,
+) -> dict[str, Solved]:  # fmt: skip
+    """Ours along all curves, begun in held-out motion: as the search leaves it, and refined and
+    locked."""
     begun, *_ = starts(data, gait, split, 3)
     with torch.no_grad():
         model.starts = model.observe(begun[seed % len(begun)][None], doubt=False)
     model.start_names = (f"{gait} {GAITS[gait].speed} m/s",)
+    raw: dict[int, list[Motion]] = {}
     found = design.design_all(
-        list(ways.values()), GAITS[gait].speed, "0", model, seed=seed, progress=True
-    )
-    told = ("finished", "begun again", "seconds")
-    return {
-        name: (motion, {key: its[key] for key in told} | {"late (s)": late(its)})
-        for name, (motion, its) in zip(ways, found, strict=True)
-    }
-
-
-@torch.no_grad()
-def finished(solved: Solved, model: nn.Module, refiner: nn.Module) -> Solved:
-    """The same, refined and with feet locked, as `motionlab.design` does when it is asked to."""
-    made = {}
-    for name, (motion, its) in solved.items():
-        features = refiner(model.encoding.encode(motion)[None])[0]
-        motion = model.encoding.to_motion(features, model.encoding.start_of(motion), name)
-        made[name] = lock_feet(motion, motion.contacts, floor=None), its
-    return made
+        list(ways.values()), GAITS[gait].speed, 0, model, refiner=refiner, lock=True, seed=seed,
+        watch=lambda path, motion, _: raw.setdefault(path, []).append(motion), progress=True,
+    )  # fmt: skip
+    solved: dict[str, Solved] = {OURS: {}, REFINED: {}}
+    for number, (name, (motion, its)) in enumerate(zip(ways, found, strict=True)):
+        for method, made in ((OURS, concatenate(raw[number])), (REFINED, motion)):
+            told = {key: its[key] for key in ("finished", "begun again", "seconds")}
+            told |= {"late (s)": late(its), "broken frames": int(broken_frames(made).sum())}
+            solved[method][name] = made, told
+    return solved
 
 
 def late(told: dict) -> float:
@@ -208,20 +194,22 @@ def pace_of(motion: Motion) -> float:
     return float(root.diff(dim=0).norm(dim=1).mean() * motion.fps)
 
 
-def kept(path: Path, solve) -> Solved:
+def kept(path: Path, solve: Callable[[], dict[str, Solved]]) -> dict[str, Solved]:
     """What was solved before, or is now; as tensors and plain values."""
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
         found = {
-            name: (motion.root_positions, motion.rotations, motion.contacts, its)
-            for name, (motion, its) in solve().items()
-        }
+            method: {name: (m.root_positions, m.rotations, m.contacts, its)
+                     for name, (m, its) in solved.items()}
+            for method, solved in solve().items()
+        }  # fmt: skip
         torch.save(found, path)
     skeleton, fps = motionlab.load(NAME).encoding.skeleton, motionlab.load(NAME).fps
     return {
-        name: (Motion(skeleton, root, turns, fps, name=name, contacts=down), its)
-        for name, (root, turns, down, its) in torch.load(path, weights_only=True).items()
-    }
+        method: {name: (Motion(skeleton, root, turns, fps, name=name, contacts=down), its)
+                 for name, (root, turns, down, its) in solved.items()}
+        for method, solved in torch.load(path, weights_only=True).items()
+    }  # fmt: skip
 
 
 # -- how near it is, and how good -------------------------------------------------------------------
@@ -254,27 +242,6 @@ def quality(points: Tensor, skeleton: Skeleton, fps: float) -> dict[str, float]:
         "acceleration (m/s²)": float(metrics.acceleration(points, fps)),
         "jerk (m/s³)": float(metrics.jerk(points, fps)),
     }
-
-
-@dataclass
-class Range:
-    """What bodies do in the training clips: the least and greatest of height and pose."""
-
-    encoding: JointAngles
-    low: Tensor
-    high: Tensor
-
-    @classmethod
-    def of(cls, data: Prepared) -> Range:
-        features = torch.cat(data.clips("train"))
-        return cls(data.encoding, features.amin(0), features.amax(0))
-
-    def broken(self, motion: Motion) -> int:
-        """Frames in which no body of these data would be."""
-        features = self.encoding.encode(motion)
-        off = torch.maximum(self.low - features, features - self.high)
-        height, pose = off[:, HEIGHT], off[:, self.encoding.slices["pose"]].amax(1)
-        return int(((height > BEYOND[0]) | (pose > BEYOND[1])).sum())
 
 
 def mean(rows: Sequence[dict], key: str) -> float:

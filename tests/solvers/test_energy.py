@@ -48,6 +48,7 @@ def wishes(network, window, piece):
         "step length": terms.step_length(0.9, body),
         "contact": terms.contact(body),
         "resting": terms.resting(body, encoding.fps, slower=20.0),
+        "poses": lambda features, *rest: terms.poses(encoding)(5 * features, *rest),
         "places": terms.places(points, [0], seen),
         "channels": terms.channels(angles, encoding.slices["pose"]),
     }
@@ -81,7 +82,8 @@ def test_noise_is_a_gaussian(network, window):
 
 
 NAMES = ["prior", "noise", "path", "hand", "toe", "time", "ahead", "speed", "direction", "turn",
-         "step length", "contact", "resting", "places", "channels"]  # fmt: skip
+         "step length", "contact", "resting", "poses", "places",
+         "channels"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -195,6 +197,19 @@ def test_what_is_slow_rests_and_what_is_fast_may(clips):
     slow, fast = straight(0.06), straight(0.12)  # 0.3 and 0.6 m/s, four joints, six frames
     assert term(features, slow, None).item() == pytest.approx(4 * 6 / 2)
     assert term(features, fast, None).item() == 0
+
+
+def test_only_what_no_body_of_the_data_does_costs(clips):
+    body = clips[0].skeleton
+    encoding = JointAngles(body, contacts=True)
+    features = encoding.encode(clips[0])[None, :7].clone()
+    term = terms.poses(encoding, std=0.1)
+    assert term(features, None, None).item() < 1e-6
+    channel = encoding.feature_names.index("Head_z")  # the data have -0.784 to 0.784
+    features[:, 3, channel] = 0.984
+    assert term(features, None, None).item() == pytest.approx(2, rel=1e-3)
+    features[:, 0, channel] = 9.0  # what stands fast already costs nothing
+    assert term(features, None, None).item() == pytest.approx(2, rel=1e-3)
 
 
 def test_step_length_is_measured_where_a_toe_sets_down(clips):

@@ -61,7 +61,16 @@ def test_the_motion_begins_where_the_path_does_and_ends_where_it_ends(walker, be
         root = walker.encoding.root_path(way.features, way.place)[:, [0, 2]].double()
         assert (root[-1] - path.places[-1]).norm() < 0.3
         assert float(root_path_error(root[:, None, [0, 0, 1]], path.places).rms) < 30
-        assert set(way.parts) == {"prior", "noise", "path", "time", "ahead", "resting", "contact"}
+        assert set(way.parts) == {
+            "prior",
+            "noise",
+            "path",
+            "time",
+            "ahead",
+            "resting",
+            "contact",
+            "poses",
+        }
         windows = -(-len(way.features[1:]) // 6)
         assert way.evaluations >= windows * (3 + 1 + 2) and way.seconds > 0
     # the same seed walks the same way, another one another way
@@ -123,7 +132,7 @@ def test_who_is_astray_begins_again_so_often_and_no_more(walker, monkeypatch):
 
 def test_who_holds_a_broken_pose_begins_again_and_whole_ones_win(walker, monkeypatch):
     """Even if their energy is higher: what is judged first is always called broken here."""
-    judged = []
+    judged, before = [], beginning(walker, [STRAIGHT])
 
     def beyond(encoding, features):
         judged.append(len(features))
@@ -133,10 +142,7 @@ def test_who_holds_a_broken_pose_begins_again_and_whole_ones_win(walker, monkeyp
     monkeypatch.setattr(windows, "ASTRAY", torch.inf)
     monkeypatch.setattr(windows, "UNLIKELY", torch.inf)
     table = STRAIGHT.timetable(1.2, 4.0, 30.0)
-    (way,) = follow(
-        walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [table], chance=calm(),
-        **QUICK | {"retries": 1},
-    )  # fmt: skip
+    (way,) = follow(walker, [STRAIGHT], before, [table], chance=calm(), **QUICK | {"retries": 1})
     assert way.retries == len(judged) / 2 == -(-len(way.features[1:]) // 6)
 
 

@@ -54,19 +54,31 @@ def beyond(encoding: JointAngles, features: Tensor) -> Tensor:
 
     encoding : one that this module `knows`.
     """
+    off, margins = _off(encoding, features)
+    return (off - margins).amax(-1)
+
+
+def outside(encoding: JointAngles, features: Tensor) -> Tensor:
+    """The same of each channel (..., frames, channels), 0 within, from the range itself on: what
+    the data themselves never do, with no margin."""
+    return _off(encoding, features)[0].clamp(min=0)
+
+
+def _off(encoding: JointAngles, features: Tensor) -> tuple[Tensor, Tensor]:
+    """How far outside its range each channel is, and the margins (channels,)."""
     first = _HEIGHT if encoding.skeleton.matches(Skeleton.canonical()) else _HEIGHT + 1
     body = features[..., first : encoding.slices["pose"].stop]
-    low, high = (edge[first - _HEIGHT :].to(body) for edge in _ranges())
-    return torch.maximum(low - body, body - high).amax(-1)
+    low, high, margins = (edge[first - _HEIGHT :].to(body) for edge in _ranges())
+    return torch.maximum(low - body, body - high), margins
 
 
 @cache
-def _ranges() -> tuple[Tensor, Tensor]:
-    """Least and largest value of each channel from the height on, the margins included."""
+def _ranges() -> tuple[Tensor, Tensor, Tensor]:
+    """Least and largest value of each channel from the height on, and its margin."""
     found = json.loads(_FILE.read_text(encoding="utf-8"))
     with torch.inference_mode(False):
         low, high = torch.tensor(list(found["ranges"].values())).unbind(1)
         height, turns = found["margins"]
         margins = torch.full_like(low, turns)
         margins[0] = height
-        return low - margins, high + margins
+        return low, high, margins

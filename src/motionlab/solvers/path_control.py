@@ -22,6 +22,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from ..errors import SolverError
+from ..metrics import broken
 from ..models import LstmGmm
 from ..models.sampler import Chance
 from ..paths import Path
@@ -46,6 +47,8 @@ def wishes(stretch: Stretch) -> dict[str, terms.Term]:
     }
     if "contacts" in encoding.slices:
         found["contact"] = terms.contact(encoding.skeleton)
+    if broken.knows(encoding):
+        found["poses"] = terms.poses(encoding)
     return found
 
 

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from ..errors import SolverError
+from ..metrics import broken
 from ..models import LstmGmm, State
 from ..models.sampler import Chance
 from ..motion import Motion
@@ -112,6 +113,8 @@ def run_up(
     recent = features[:, -round(AVERAGE * model.fps) :, :3].double()
     going, speed, turning = recently(recent, model.fps)
     unlike = (speed - pace[:, 0]).abs() + 0.5 * turning.abs() + 0.5 * going.sin().abs()
+    if broken.knows(model.encoding):  # the frame that a path begins with is not searched for
+        unlike += (broken.beyond(model.encoding, features[:, -1:])[:, 0] > 0).double()
     best = unlike.nan_to_num(torch.inf).view(len(paths), -1).argmin(1)
     best = best + SAMPLES * torch.arange(len(paths))
     place = beginnings(paths, torch.where(speed < STANDING, 0.0, going)[best])

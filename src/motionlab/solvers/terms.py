@@ -24,9 +24,11 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from ..encodings import JointAngles
 from ..errors import SolverError
 from ..feet.contacts import foot_points, rest_heights
 from ..metrics import facing
+from ..metrics.broken import outside
 from ..paths import Piece
 from ..skeleton import Skeleton
 
@@ -40,6 +42,9 @@ FACING = 0.2  # rad; people face 0.19 off their way
 STEP = 0.03  # m
 SLIDE, HEIGHT = 0.004, 0.008  # m a frame, m: a fifth of what sampled toes do; recorded do neither
 REST = 0.002  # m a frame: heels, which no lock holds afterwards
+POSE = (
+    0.03  # rad, and m of the root's height, beyond what the data do; that is broken from 0.1 rad on
+)
 SLOW = 0.45  # m/s, of a foot in contact: the paper's
 ROOT, ANGLE = 0.02, 0.08  # m, rad: the weaker noise that denoising is tried on
 _GROUND = [0, 2]
@@ -188,6 +193,22 @@ def resting(skeleton: Skeleton, fps: float, slide: float = REST, slower: float =
         moves = positions[:, :, feet].diff(dim=1)  # (batch, frames, 4, 3)
         slow = (moves.detach().norm(dim=-1) * fps < slower)[..., None]
         return _gaussian((moves[..., _GROUND] * slow).flatten(2), slide)
+
+    return term
+
+
+def poses(encoding: JointAngles, std: float = POSE) -> Term:
+    """No joint goes beyond the range that it has in the data; within, this says nothing.
+
+    The network was shown no such poses, but does not rule them out: an elbow may bend a little the
+    wrong way if that brings the root nearer to its path. Not the paper's.
+
+    encoding : one that `metrics.broken` knows.
+    """
+
+    @_looking_at()
+    def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
+        return _gaussian(outside(encoding, features[:, 1:]), std)
 
     return term
 
