@@ -181,5 +181,5 @@ BASELINES: dict[str, dict] = {
         "retries": 0,
         "steps": 60,
     },
-    "frame by frame": {"window": 1, "overlap": 0},
+    "frame by frame": {"window": 1, "overlap": 0, "retries": 0},
 }
