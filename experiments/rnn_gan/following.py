@@ -26,7 +26,6 @@ from motionlab import Motion, Skeleton, metrics
 from motionlab.feet import contacts
 from motionlab.metrics import broken_frames
 from motionlab.models import pfnn
-from motionlab.motion import concatenate
 from motionlab.paths import Path as Way
 from motionlab.paths import Piece
 from motionlab.solvers import design
@@ -99,12 +98,12 @@ def of_gait(
 ) -> dict:  # fmt: skip
     """All curves by all methods, in one gait."""
     ways = {name: Way.through(curve) for name, curve in curves_of(gait).items()}
-    found = [
+    raw = [
         kept(runs / f"{gait}-{seed}.pt",
-             lambda seed=seed: walked(gait, model, refiner, data, "test", ways, seed))
+             lambda seed=seed: walked(gait, model, data, "test", ways, seed))
         for seed in seeds
     ]  # fmt: skip
-    solved = {method: [each[method] for each in found] for method in (OURS, REFINED)}
+    solved = {OURS: raw, REFINED: [finished(each, refiner) for each in raw]}
     rows = {
         method: {
             name: [row_of(each[name][0], way) | each[name][1] for each in found]
@@ -120,9 +119,8 @@ def of_gait(
             for name, way in ways.items()
         }
     few = {name: way for name, way in ways.items() if not name.startswith("spline")}
-    learnt = kept(
-        runs / f"{gait}-val.pt", lambda: walked(gait, model, refiner, data, "val", few, 0)
-    )
+    learnt = kept(runs / f"{gait}-val.pt", lambda: walked(gait, model, data, "val", few, 0))
+    learnt = {OURS: learnt, REFINED: finished(learnt, refiner)}
     return {
         "speed asked (m/s)": GAITS[gait].speed,
         "curves": rows,
@@ -138,27 +136,31 @@ Solved = dict[str, tuple[Motion, dict]]  # by the name of the curve
 
 
 def walked(
-    gait: str, model: nn.Module, refiner: nn.Module, data: Prepared, split: str,
-    ways: dict[str, Way], seed: int,
-) -> dict[str, Solved]:  # fmt: skip
-    """Ours along all curves, begun in held-out motion: as the search leaves it, and refined and
-    locked."""
+    gait: str, model: nn.Module, data: Prepared, split: str, ways: dict[str, Way], seed: int
+) -> Solved:
+    """Ours along all curves, begun in held-out motion, as the search leaves it."""
     begun, *_ = starts(data, gait, split, 3)
     with torch.no_grad():
         model.starts = model.observe(begun[seed % len(begun)][None], doubt=False)
     model.start_names = (f"{gait} {GAITS[gait].speed} m/s",)
-    raw: dict[int, list[Motion]] = {}
     found = design.design_all(
-        list(ways.values()), GAITS[gait].speed, 0, model, refiner=refiner, lock=True, seed=seed,
-        watch=lambda path, motion, _: raw.setdefault(path, []).append(motion), progress=True,
-    )  # fmt: skip
-    solved: dict[str, Solved] = {OURS: {}, REFINED: {}}
-    for number, (name, (motion, its)) in enumerate(zip(ways, found, strict=True)):
-        for method, made in ((OURS, concatenate(raw[number])), (REFINED, motion)):
-            told = {key: its[key] for key in ("finished", "begun again", "seconds")}
-            told |= {"late (s)": late(its), "broken frames": int(broken_frames(made).sum())}
-            solved[method][name] = made, told
-    return solved
+        list(ways.values()), GAITS[gait].speed, 0, model, seed=seed, progress=True
+    )
+    told = ("finished", "begun again", "seconds", "broken frames")
+    return {
+        name: (motion, {key: its[key] for key in told} | {"late (s)": late(its)})
+        for name, (motion, its) in zip(ways, found, strict=True)
+    }
+
+
+@torch.no_grad()
+def finished(solved: Solved, refiner: nn.Module) -> Solved:
+    """The same, refined and with feet locked, as `motionlab.design` does it when it is asked to."""
+    made = {}
+    for name, (raw, its) in solved.items():
+        motion = design.finished(raw, refiner, lock=True)
+        made[name] = motion, its | {"broken frames": int(broken_frames(motion).sum())}
+    return made
 
 
 def late(told: dict) -> float:
@@ -194,22 +196,20 @@ def pace_of(motion: Motion) -> float:
     return float(root.diff(dim=0).norm(dim=1).mean() * motion.fps)
 
 
-def kept(path: Path, solve: Callable[[], dict[str, Solved]]) -> dict[str, Solved]:
+def kept(path: Path, solve: Callable[[], Solved]) -> Solved:
     """What was solved before, or is now; as tensors and plain values."""
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
         found = {
-            method: {name: (m.root_positions, m.rotations, m.contacts, its)
-                     for name, (m, its) in solved.items()}
-            for method, solved in solve().items()
-        }  # fmt: skip
+            name: (motion.root_positions, motion.rotations, motion.contacts, its)
+            for name, (motion, its) in solve().items()
+        }
         torch.save(found, path)
     skeleton, fps = motionlab.load(NAME).encoding.skeleton, motionlab.load(NAME).fps
     return {
-        method: {name: (Motion(skeleton, root, turns, fps, name=name, contacts=down), its)
-                 for name, (root, turns, down, its) in solved.items()}
-        for method, solved in torch.load(path, weights_only=True).items()
-    }  # fmt: skip
+        name: (Motion(skeleton, root, turns, fps, name=name, contacts=down), its)
+        for name, (root, turns, down, its) in torch.load(path, weights_only=True).items()
+    }
 
 
 # -- how near it is, and how good -------------------------------------------------------------------

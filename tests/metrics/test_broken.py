@@ -10,7 +10,7 @@ from motionlab import Motion, Skeleton, datasets
 from motionlab.encodings import JointAngles
 from motionlab.errors import MetricError
 from motionlab.metrics import broken_frames
-from motionlab.metrics.broken import beyond, knows
+from motionlab.metrics.broken import beyond, knows, within
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +66,16 @@ def test_of_other_bodies_it_knows_nothing(gait):
         broken_frames(motion)
     assert not knows(JointAngles(gait.skeleton, rotation="6d"))
     assert knows(JointAngles(gait.skeleton))
+
+
+def test_what_is_within_stays_and_what_is_beyond_comes_to_the_edge(gait):
+    encoding = JointAngles(gait.skeleton, contacts=True)
+    rows = encoding.encode(gait)[:6]
+    torch.testing.assert_close(within(encoding, rows), rows)
+    odd = rows.clone()
+    channel = encoding.feature_names.index("Head_z")  # the data have -0.784 to 0.784
+    odd[3, channel] = 2.0
+    found = within(encoding, odd)
+    assert found[3, channel] == pytest.approx(0.784) and beyond(encoding, found).max() < 0
+    others = torch.arange(rows.shape[1]) != channel
+    torch.testing.assert_close(found[:, others], rows[:, others])

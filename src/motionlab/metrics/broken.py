@@ -64,6 +64,14 @@ def outside(encoding: JointAngles, features: Tensor) -> Tensor:
     return _off(encoding, features)[0].clamp(min=0)
 
 
+def within(encoding: JointAngles, features: Tensor) -> Tensor:
+    """The features (..., frames, dim) with each joint's numbers brought back into their range."""
+    first, last = encoding.slices["pose"].start, encoding.slices["pose"].stop
+    low, high, _ = (edge[first - _HEIGHT :].to(features) for edge in _ranges())
+    body = features[..., first:last].clamp(low, high)
+    return torch.cat([features[..., :first], body, features[..., last:]], -1)
+
+
 def _off(encoding: JointAngles, features: Tensor) -> tuple[Tensor, Tensor]:
     """How far outside its range each channel is, and the margins (channels,)."""
     first = _HEIGHT if encoding.skeleton.matches(Skeleton.canonical()) else _HEIGHT + 1

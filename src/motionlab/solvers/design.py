@@ -21,7 +21,7 @@ from ..encodings.base import drawn_as_canonical
 from ..errors import SolverError
 from ..feet.contacts import label
 from ..feet.lock import lock_feet
-from ..metrics import broken_frames, root_path_error
+from ..metrics import broken, broken_frames, root_path_error
 from ..models import LstmGmm, Refiner
 from ..models.sampler import Chance
 from ..motion import Motion
@@ -154,14 +154,15 @@ def finished(motion: Motion, refiner: Refiner | None = None, lock: bool = False)
     """A motion as `design` gives it: its body refined, its toes held still while they are in contact.
 
     The refiner knows of no path and would leave it by some millimetres a step: the root stays over the
-    way it has. A lock lowers the root at most.
+    way it has. Nor does it know what joints can do: what it turns beyond the range of the data is
+    brought back to its edge. A lock lowers the root at most.
     """
     if refiner is not None:
         encoding = refiner.encoding
-        body = encoding.to_motion(
-            refiner(encoding.encode(motion)[None])[0], encoding.start_of(motion), motion.name,
-            motion.source,
-        )  # fmt: skip
+        features = refiner(encoding.encode(motion)[None])[0]
+        if broken.knows(encoding):
+            features = broken.within(encoding, features)
+        body = encoding.to_motion(features, encoding.start_of(motion), motion.name, motion.source)
         root = motion.root_positions.clone()
         root[:, 1] = body.root_positions[:, 1]
         motion = replace(body, root_positions=root)
