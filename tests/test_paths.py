@@ -22,7 +22,7 @@ def circle(radius, turns=1.0, n=200):
 
 def whole(path):
     """All of a path as a piece, twice over."""
-    zero = torch.zeros(2)
+    zero = torch.zeros(2, dtype=torch.float64)
     return Curves([path]).piece(zero, zero + path.length, torch.tensor([0, 0]))
 
 

@@ -17,6 +17,7 @@ READ_WHEN_IT_RUNS = {
     "motionlab/viewer/live/scene.html",
     "motionlab/viewer/live/static/player.js",
     "motionlab/viewer/live/static/widget.js",
+    "motionlab/metrics/pose_ranges.json",
     "motionlab/viewer/pictures/style.mplstyle",
 } | {
     f"motionlab/weights/{path.name}"
