@@ -88,8 +88,7 @@ class Piece(NamedTuple):
 class Path:
     """A curve on the ground, in places evenly spaced, and when to be where.
 
-    drawn : (n, 2) metres, the line as it was given, without repeated places; or the smooth curve
-        through what was given.
+    drawn : (n, 2) metres, as given, without repeated places; or the smooth curve through them.
     places : (m, 2) metres, the curve that is to be walked: corners rounded.
     times : (k,) seconds and `behind` (k,) metres of path at them; None if only the speed is given.
     """
