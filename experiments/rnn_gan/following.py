@@ -5,8 +5,8 @@
 What is measured and how it is judged stands in claims.yaml. Ours begins in held-out motion, another
 one for each seed. PFNN's authors' network is taken as it is, and led so fast that it comes to the
 same mean speed; a network of the same architecture, trained here by `motionlab train pfnn --preset
-ship`, is measured beside if it is there. What is solved is kept in runs/following/: stopped and
-started again, it goes on, and can be looked at.
+ship`, is measured beside if it is there. What is solved is kept in runs/following/, by the weights
+that it was solved with: stopped and started again, it goes on, and can be looked at.
 """
 
 from __future__ import annotations
@@ -78,7 +78,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if TRAINED in rivals:
         weights[TRAINED] = record.about_weights(rivals[TRAINED], chosen.pfnn)
     gaits = {
-        gait: of_gait(gait, model, refiner, rivals, data, chosen.seeds, chosen.runs)
+        gait: of_gait(
+            gait, model, refiner, rivals, data, chosen.seeds, chosen.runs / model.hash[:8]
+        )
         for gait in chosen.gaits
     }
     result = {"weights": weights, "gaits": gaits}
@@ -255,7 +257,7 @@ def median(values: Sequence[float]) -> float:
 
 def summary(rows: dict[str, list[dict]], rivals: dict[str, list[dict]]) -> dict:
     """Over all curves, each the mean of its seeds; intervals over curves."""
-    keys = [key for key in next(iter(rows.values()))[0] if key not in ("finished",)]
+    keys = [key for key in next(iter(rows.values()))[0] if key != "finished"]
     found: dict = {
         key: metrics.bootstrap([mean(each, key) for each in rows.values()], median) for key in keys
     }
