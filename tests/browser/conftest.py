@@ -17,3 +17,27 @@ def browser():
         browser = playwright.chromium.launch(executable_path=path, args=check_book.FLAGS)
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def size():
+    """Of the windows that `visit` opens; a module may have its own."""
+    return {"width": 900, "height": 900}
+
+
+@pytest.fixture
+def visit(browser, folder, size):
+    """Opens a page of a module's folder without network; at the end, nothing may have gone wrong."""
+    import check_book
+
+    opened = []
+
+    def visit(name: str = "page.html", **settings) -> check_book.Visit:
+        window = browser.new_context(**{"viewport": size, "offline": True, **settings})
+        opened.append(check_book.Visit(window, (folder / name).as_uri()))
+        return opened[-1]
+
+    yield visit
+    for one in opened:
+        assert one.troubles == []
+        one.page.context.close()

@@ -75,23 +75,6 @@ def folder(model, clips, tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def visit(browser, folder):
-    """Opens a page of the folder without network; at the end, nothing may have gone wrong."""
-    opened = []
-
-    def visit(name: str = "page.html", **settings) -> check_book.Visit:
-        size = {"width": 900, "height": 900}
-        window = browser.new_context(**{"viewport": size, "offline": True, **settings})
-        opened.append(check_book.Visit(window, (folder / name).as_uri()))
-        return opened[-1]
-
-    yield visit
-    for one in opened:
-        assert one.troubles == []
-        one.page.context.close()
-
-
 def value(page, of: str):
     return page.evaluate(f"document.querySelector('figure').motionlab.{of}")
 

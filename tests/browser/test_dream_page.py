@@ -62,20 +62,8 @@ def folder(model, dancer, tmp_path_factory):
 
 
 @pytest.fixture
-def visit(browser, folder, request):
-    """Opens a page of the folder without network; at the end, nothing may have gone wrong."""
-    opened = []
-
-    def visit(name: str = "page.html", **settings) -> check_book.Visit:
-        size = {"width": 700, "height": 800}
-        window = browser.new_context(**{"viewport": size, "offline": True, **settings})
-        opened.append(check_book.Visit(window, (folder / name).as_uri()))
-        return opened[-1]
-
-    yield visit
-    for one in opened:
-        assert one.troubles == []
-        one.page.context.close()
+def size():
+    return {"width": 700, "height": 800}
 
 
 def load(page):
