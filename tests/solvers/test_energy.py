@@ -147,6 +147,21 @@ def test_weights_scale_and_leave_out(network, window, wishes):
     torch.testing.assert_close(total, sum(full.values()))
 
 
+def test_each_window_may_have_weights_of_its_own(network, window, wishes):
+    before, s, d = window
+    weights = {"path": torch.tensor([0.0, 3.0]), "prior": torch.tensor([1.0, 0.0])}
+    both = Energy(network, before, wishes, weights)(s, d)
+    for row in (0, 1):
+        its = {name: float(weight[row]) for name, weight in weights.items()}
+        torch.testing.assert_close(both[row], Energy(network, before, wishes, its)(s, d)[row])
+
+
+@pytest.mark.parametrize("weight", [-1.0, float("nan"), torch.tensor([1.0, -0.5]), float("inf")])
+def test_a_weight_that_is_none_is_refused(network, window, wishes, weight):
+    with pytest.raises(SolverError, match="must be 0 or more"):
+        Energy(network, window[0], wishes, {"path": weight})
+
+
 # -- what terms mean ------------------------------------------------------------------------------
 
 

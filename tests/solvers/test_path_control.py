@@ -246,12 +246,25 @@ def test_interrupted_it_gives_what_it_has(walker):
         run(at_once)
 
 
+def test_each_path_may_have_weights_of_its_own(walker):
+    paths = [BENT, BENT]
+    tables = [path.timetable(1.2, 4.0, 30.0) for path in paths]
+    weights = {"path": torch.tensor([0.0, 1.0]), "time": 1.0}
+    free, held = follow(
+        walker, paths, beginning(walker, paths), tables, weights=weights, chance=calm(), **QUICK
+    )
+    assert free.parts["path"] == 0 and held.parts["path"] > 0
+    assert free.retries == 0  # who is asked for no path can't be astray of it
+    assert free.features.isfinite().all() and held.features.isfinite().all()
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [({"method": "newton"}, "adam, lbfgs"), ({"steps": 0}, "at least 1"),
      ({"overlap": 12}, "share"), ({"overlap": 0}, "share"), ({"window": 1, "overlap": 1}, "share"),
      ({"retries": -1}, "at least 1, 1 and 0"), ({"candidates": 0}, "at least 1"),
-     ({"weights": {"way": 2.0}}, "the terms are")],
+     ({"weights": {"way": 2.0}}, "the terms are"),
+     ({"weights": {"path": torch.ones(2)}}, "weights for 1 path")],
 )  # fmt: skip
 def test_settings_that_make_no_sense(walker, options, said):
     before, table = beginning(walker, [STRAIGHT]), STRAIGHT.timetable(1.2, 4.0, 30.0)

@@ -57,7 +57,8 @@ class Energy:
     model : a generator with a likelihood; its parameters should ask for no gradients.
     before : (batch), where the windows begin.
     terms : wishes by name, of `terms` or your own; "prior" and "noise" are always there.
-    weights : factor on a term by its name, 1 where none is given. A weight of 0 leaves it out.
+    weights : factor on a term by its name, 1 where none is given; or factors (batch,), a window each.
+        A weight of 0 for all leaves it out.
 
     Raises
     ------
@@ -69,7 +70,7 @@ class Energy:
         model: LstmGmm,
         before: Before,
         terms: Mapping[str, Term] | None = None,
-        weights: Mapping[str, float] | None = None,
+        weights: Mapping[str, float | Tensor] | None = None,
     ) -> None:
         if not isinstance(model, LstmGmm):
             raise SolverError(
@@ -81,7 +82,7 @@ class Energy:
         for name, weight in self.weights.items():
             if name not in known:
                 raise SolverError(f"A weight for {name!r}; the terms are {', '.join(known)}.")
-            if not 0 <= weight < float("inf"):
+            if not all(0 <= each < float("inf") for each in torch.as_tensor(weight).reshape(-1)):
                 raise SolverError(f"The weight of {name!r} is {weight!r}; it must be 0 or more.")
         if twice := set(OWN) & set(self.terms):
             raise SolverError(f"{sorted(twice)} are the energy's own terms; take other names.")
@@ -99,7 +100,8 @@ class Energy:
         d : (batch, frames, dim), what disturbs the network's inputs, in normalised units. That of
             the last frame matters to what follows the window only.
         """
-        wanted = lambda name: self.weights.get(name, 1.0) > 0
+        each = {name for name, weight in self.weights.items() if getattr(weight, "ndim", 0)}
+        wanted = lambda name: name in each or self.weights.get(name, 1.0) > 0
         found = {}
         features = self.model.normalizer.inverse(s)
         if wanted("prior"):

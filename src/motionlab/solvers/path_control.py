@@ -82,7 +82,7 @@ def follow(
     *,
     fastest: float,
     wish: Wishes = wishes,
-    weights: Mapping[str, float] | None = None,
+    weights: Mapping[str, float | Tensor] | None = None,
     method: str = "adam",
     steps: int = STEPS,
     candidates: int = CANDIDATES,
@@ -102,7 +102,8 @@ def follow(
     paths : (n), and before : (n), the frame that each begins with, where the path begins.
     tables : of each path, metres (frames + 1,) behind the root, as `Path.timetable` gives them.
     fastest : m/s that who is late does not go beyond.
-    wish : what is wished in a window; weights : of its terms, by name.
+    wish : what is wished in a window; weights : of its terms, by name: a number, or one for each path
+        (n,).
     method, steps : of `window.solve`.
     candidates : samples that the first guess is chosen from; guide : whether they are guided to the
         path, or free. retries : times that a window which came to nothing begins again.
@@ -121,7 +122,7 @@ def follow(
         chance = Chance(torch.Generator().manual_seed(0), **getattr(model, "sampling", {}))
     how = Settings(fastest, wish, weights or {}, chance, method, steps, candidates, guide, retries,
                    window, overlap)  # fmt: skip
-    _check(how)
+    _check(how, len(paths))
     ways = [
         Way(table.double(), [frame])
         for table, frame in zip(tables, before.frame[:, None], strict=True)
@@ -154,13 +155,19 @@ def _means(parts: list[dict[str, float]]) -> dict[str, float]:
     )
 
 
-def _check(how: Settings) -> None:
+def _check(how: Settings, paths: int) -> None:
     if how.method not in METHODS:
         raise SolverError(f"method is {how.method!r}; it must be one of {', '.join(METHODS)}.")
     if how.steps < 1 or how.candidates < 1 or how.retries < 0:
         raise SolverError(
             f"{how.steps} steps, {how.candidates} candidates, {how.retries} retries: at least 1, 1 and 0."
         )
+    for name, weight in how.weights.items():
+        if isinstance(weight, Tensor) and weight.ndim and weight.shape != (paths,):
+            raise SolverError(
+                f"The weights of {name!r} have shape {tuple(weight.shape)}; there must be a number, or "
+                f"weights for {paths} path{'s' if paths > 1 else ''}."
+            )
     if not 0 <= how.overlap < how.window or (how.window > 1 and how.overlap < 1):
         raise SolverError(
             f"Windows of {how.window} frames that share {how.overlap}: they must share at least 1 and "

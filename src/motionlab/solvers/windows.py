@@ -54,7 +54,7 @@ class Settings:
 
     fastest: float
     wish: Wishes
-    weights: Mapping[str, float]
+    weights: Mapping[str, float | Tensor]
     chance: Chance
     method: str
     steps: int
@@ -162,7 +162,11 @@ class Job:
         first, last = self.arcs[rows] - 0.5, arcs[rows].amax(1) + 2.0
         piece = self.curves.piece(first, last, self.which[rows])
         stretch = Stretch(self.model, piece, arcs[rows], self.which[rows], self.first)
-        return Energy(self.model, self.before[rows], self.how.wish(stretch), self.how.weights)
+        weights = {
+            name: weight[self.which[rows]] if isinstance(weight, Tensor) and weight.ndim else weight
+            for name, weight in self.how.weights.items()
+        }
+        return Energy(self.model, self.before[rows], self.how.wish(stretch), weights)
 
     def _solve(self, arcs: Tensor, rows: Tensor, s: Tensor, d: Tensor) -> Solved:
         """From a guess, for some of the batch."""
@@ -214,14 +218,15 @@ class Job:
     def _off(self, arcs: Tensor, solved: Solved, rows: Tensor) -> Tensor:
         """Metres (rows,), root mean square, from the path; 0 where nobody asks for one."""
         energy = self._energy(arcs, rows)
-        if "path" not in energy.terms or energy.weights.get("path") == 0:
+        if "path" not in energy.terms:
             return torch.zeros(len(rows))
         before = energy.before
         features = torch.cat([before.frame[:, None], self.model.normalizer.inverse(solved.s)], 1)
         root = self.model.encoding.root_path(features, before.place)[:, 1:, [0, 2]]
         first, last = self.arcs[rows] - 0.5, arcs[rows].amax(1) + 2.0
         piece = self.curves.piece(first, last, self.which[rows])
-        return (root - piece.nearest(root).places).square().sum(-1).mean(1).sqrt()
+        off = (root - piece.nearest(root).places).square().sum(-1).mean(1).sqrt()
+        return off * (torch.as_tensor(energy.weights.get("path", 1.0)) > 0)
 
     @torch.no_grad()
     def _astray(self, arcs: Tensor, solved: Solved, rows: Tensor) -> Tensor:
