@@ -16,10 +16,13 @@ likelihood on validation clips.
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+from torch import nn
 
 import motionlab
 from motionlab.training import PRESETS, Prepared
@@ -84,8 +87,16 @@ def run_of(row: trainings.Row, seed: int, preset: str) -> Run:
 
 
 def measured(run: Run, data: Prepared, count: int) -> dict:
-    """Pace and likelihood on validation clips of one training."""
+    """Pace and likelihood on validation clips of one training, measured before or now."""
     model = motionlab.load(run.folder / "best.safetensors")
+    kept = run.folder / f"pace-{model.hash[:8]}-{data.hash[:8]}-{count}.json"
+    if not kept.is_file():
+        found = record.rounded(_measured(model, data, count))
+        kept.write_text(json.dumps(found), encoding="utf-8")
+    return json.loads(kept.read_text(encoding="utf-8"))
+
+
+def _measured(model: nn.Module, data: Prepared, count: int) -> dict:
     found = {"likelihood": likelihood(model, data.clips("val"))._asdict()}
     for gait in GAITS:
         begun, speeds, _ = starts(data, gait, "val", count)

@@ -3,7 +3,7 @@
 Window after window of 34 frames, 17 of which are solved again with the next: those at the end of a
 window do not know yet what comes. In each,
 
-1. `guided` sampling draws a few ways to go on, and the least unlikely is the first guess;
+1. a few ways to go on are sampled, and the one of least energy is the first guess;
 2. `window.solve` descends from there, and goes on where that has not led near the path (`windows.LONGER`);
 3. who fell off his path, or his feet, begins again from other samples (`retries` times);
 4. the first 17 frames stand fast, and the network's state goes on exactly behind them.
@@ -86,7 +86,7 @@ def follow(
     method: str = "adam",
     steps: int = STEPS,
     candidates: int = CANDIDATES,
-    guide: bool = True,
+    guide: bool = False,
     retries: int = RETRIES,
     window: int = WINDOW,
     overlap: int = OVERLAP,
@@ -105,8 +105,9 @@ def follow(
     wish : what is wished in a window; weights : of its terms, by name: a number, or one for each path
         (n,).
     method, steps : of `window.solve`.
-    candidates : samples that the first guess is chosen from; guide : whether they are guided to the
-        path, or free. retries : times that a window which came to nothing begins again.
+    candidates : samples that the first guess is chosen from; guide : whether they are `guided` to the
+        path, or free. Guided ones are nearer to it, and less of a walk: what the push bends stays bent,
+        and the end is no better. retries : times that a window which came to nothing begins again.
     window, overlap : frames; with a window of 1 and no overlap nobody looks ahead.
     chance : how samples are drawn; None: as the model's `sampling` says, from seed 0.
     watch : called behind each window, for each path that is still walked, with what newly stands fast.
@@ -177,16 +178,10 @@ def _check(how: Settings, paths: int) -> None:
 
 # What a search is compared with: settings of `follow` and of `motionlab.design`.
 BASELINES: dict[str, dict] = {
-    "best of 64 free samples": {"method": "none", "guide": False, "candidates": 64, "retries": 0},
-    "guided sampling": {"method": "none", "candidates": 1, "retries": 0},
-    "swarm": {"method": "swarm", "guide": False, "candidates": 1, "retries": 0, "steps": 30},
-    "L-BFGS": {"method": "lbfgs", "guide": False, "candidates": 1, "retries": 0, "steps": 60},
-    "swarm, then L-BFGS": {
-        "method": "paper",
-        "guide": False,
-        "candidates": 1,
-        "retries": 0,
-        "steps": 60,
-    },
+    "best of 64 free samples": {"method": "none", "candidates": 64, "retries": 0},
+    "guided sampling": {"method": "none", "guide": True, "candidates": 1, "retries": 0},
+    "swarm": {"method": "swarm", "candidates": 1, "retries": 0, "steps": 30},
+    "L-BFGS": {"method": "lbfgs", "candidates": 1, "retries": 0, "steps": 60},
+    "swarm, then L-BFGS": {"method": "paper", "candidates": 1, "retries": 0, "steps": 60},
     "frame by frame": {"window": 1, "overlap": 0, "retries": 0},
 }

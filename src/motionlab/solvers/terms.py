@@ -41,7 +41,7 @@ SPEED = 0.1  # m/s of a window's mean speed
 FACING = 0.2  # rad; people face 0.19 off their way
 STEP = 0.03  # m
 SLIDE, HEIGHT = 0.004, 0.008  # m a frame, m: a fifth of what sampled toes do; recorded do neither
-REST = 0.002  # m a frame: heels, which no lock holds afterwards
+REST = 0.006  # m a frame: less holds feet better, and jerks them
 POSE = (
     0.03  # rad, and m of the root's height, beyond what the data do; that is broken from 0.1 rad on
 )

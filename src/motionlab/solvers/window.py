@@ -7,7 +7,7 @@ change lasts: the frames behind it keep a share of it, as they do when the netwo
 (its means hold on to the frame before). A root's lean into a bend is one number then, not thirty that
 must agree.
 
-Adam is what is used, with steps as long as a deviation and a short memory: it comes as low as with
+Adam is what is used, with steps of about half a deviation and a short memory: it comes as low as with
 its usual settings, frame by frame, in a fifth of the steps (``benchmarks/bench_design.py``). L-BFGS, the paper's, is
 there to compare: windows of a batch must share its step lengths. So are the swarm, the paper's
 beginning, which sees little in four thousand dimensions, and "paper": a few of its moves, then L-BFGS.
@@ -28,9 +28,10 @@ from .swarm import swarm
 METHODS = ("adam", "lbfgs", "swarm", "paper", "none")
 DESCENTS = ("adam", "lbfgs", "paper")
 FEW = 10  # moves of the swarm before L-BFGS, as the paper does it
-RATE = 1.0  # of Adam, in deviations; falls to a tenth over the second half
+RATE = 0.6  # of Adam, in deviations: with longer steps the body trembles more
+HOLD, LOW = 0.3, 0.1  # share of the steps with this rate, and of the rate that is left in the end
 PUSH, SQUARE = 0.5, 0.8  # what Adam keeps of its averages of slopes and of their squares, a step
-LASTS = 0.7  # of a change in a frame, in the next
+LASTS = 0.85  # of a change in a frame, in the next
 FARTHEST = 8.0  # deviations from the first guess: what goes farther has diverged
 
 
@@ -129,7 +130,7 @@ def _adam(search: _Search, free: Tensor, steps: int) -> None:
         _, slope = search.slope(free)
         first = torch.lerp(slope, first, PUSH)
         second = torch.lerp(slope.square(), second, SQUARE)
-        rate = RATE * min(1.0, 0.1 + 1.8 * (1 - t / steps))
+        rate = RATE * (1 - (1 - LOW) * max(0.0, (t / steps - HOLD) / (1 - HOLD)))
         step = first / (1 - PUSH**t) / ((second / (1 - SQUARE**t)).sqrt() + 1e-8)
         free = (free - rate * step).clamp(-FARTHEST, FARTHEST)
     with torch.no_grad():

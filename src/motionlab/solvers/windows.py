@@ -178,7 +178,7 @@ class Job:
 
     @torch.no_grad()
     def _guess(self, arcs: Tensor, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """The least unlikely of a few guided samples; they begin with the tail of the window before."""
+        """Of a few samples that of least energy; they begin with the tail of the window before."""
         many = rows.repeat_interleave(self.how.candidates)
         before, place, recent = self.before[many], self.before.place[many], self.recent[many]
         done, where = 0, self.arcs[many]

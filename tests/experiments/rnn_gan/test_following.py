@@ -4,6 +4,7 @@ import math
 
 import pytest
 import torch
+from steady_pfnn import PACE, TURN, layout, steady
 
 from experiments.rnn_gan import curves, following
 from motionlab.datasets import gaits
@@ -73,3 +74,14 @@ def test_ratios_are_of_the_same_curves():
     assert told["nearer than PFNN"] == 0.5
     assert told["without broken frames"] == 0.75 and told["finished"] == 1.0
     assert following.summary(theirs, theirs)["rms over PFNN's"].value == 1.0
+
+
+def test_at_its_ease_a_rival_is_led_at_the_speed_at_which_it_errs_least(monkeypatch):
+    """This one walks its own bend, whatever it is told: the longer it is led, the farther it is off."""
+    monkeypatch.setitem(following.EASY, "walk", (0.5, 0.9, 0.7))
+    ways = {"straight": Way.through([[0.0, 0.0], [0.0, 4.0]])}
+    motions, speed = following.at_ease(steady(layout(gaits=0)), ways, "walk")
+    assert speed == 0.9  # the fastest comes to an end first
+    assert following.pace_of(motions["straight"]) == pytest.approx(30 * PACE, rel=0.05)
+    bent = motions["straight"].positions()[:, 0, 0]
+    assert bent[-1].abs() > 10 * TURN
