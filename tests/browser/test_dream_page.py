@@ -43,7 +43,7 @@ def dancer(clips):
 @pytest.fixture(scope="module")
 def folder(model, dancer, tmp_path_factory):
     """page.html with the network beside it, missing.html without, alone.html that needs nothing;
-    exact.html, whose weights are not rounded; dancer.html, of another kind of network."""
+    exact.html, whose weights are not rounded; dancer.html, of another kind of network; both.html."""
     folder = tmp_path_factory.mktemp("dream")
     shutil.copy(bundle_path(), folder / "player.js")
     figure = page_figure(model, seconds=2, height=200, caption="A walker")
@@ -57,7 +57,10 @@ def folder(model, dancer, tmp_path_factory):
     NetworkFigure(figure.content | {"live": live}, exact, figure.still, None).save(
         folder / "exact.html"
     )
-    page_figure(dancer, seconds=1, height=200).save(folder / "dancer.html")
+    other = page_figure(dancer, seconds=1, height=200)
+    other.save(folder / "dancer.html")
+    other.weights.write(folder / "_static")
+    (folder / "both.html").write_text(PAGE.format(figure.html + other.html), encoding="utf-8")
     return folder
 
 
@@ -127,6 +130,57 @@ def test_its_step_is_that_of_torch(visit, model, clips, name):
         for expected, part in zip(mixture, parts, strict=True):
             worst = max(worst, np.abs(expected.flatten().numpy() - part).max())
     assert worst < 1e-3
+
+
+def end_after(frames: int) -> str:
+    """Script: where each figure's characters are after so many frames, all figures by turns; or one by one."""
+    return f"""byTurns => {{
+      const dreamers = [...document.querySelectorAll("figure.motionlab-dream")].map((figure) => figure.motionlab.dreamer);
+      for (const dreamer of dreamers) dreamer.restart();
+      if (byTurns) for (let frame = 1; frame <= {frames}; frame++) dreamers.forEach((dreamer) => dreamer.reach(frame));
+      else dreamers.forEach((dreamer) => dreamer.reach({frames}));
+      return dreamers.map((dreamer) => Array.from(dreamer.tracks[0].room({frames})));
+    }}"""
+
+
+def load_all(page):
+    while (button := page.get_by_role("button", name="Load the network")).count():
+        loaded = page.locator("figure[data-live]").count()
+        button.first.click()
+        page.locator("figure[data-live]").nth(loaded).wait_for(timeout=20_000)
+        page.get_by_role("button", name="Pause").last.click()
+
+
+def test_two_networks_of_a_page_keep_their_own(visit):
+    page = visit("both.html").page
+    load_all(page)
+    simd = "figure => !!figure.motionlab.dreamer.network.leave.layer.arrays"
+    assert [figure.evaluate(simd) for figure in page.locator("figure.motionlab-dream").all()] == [
+        True,
+        True,
+    ]
+    by_turns, alone = (page.evaluate(end_after(30), turns) for turns in (True, False))
+    assert by_turns == alone
+
+
+@pytest.mark.parametrize("lacking", ["WebAssembly", "WebAssembly.validate", "WebAssembly.Memory"])
+def test_a_browser_without_simd_goes_on(browser, folder, visit, lacking):
+    """In plain JavaScript, and to the same place."""
+    window = browser.new_context(offline=True)
+    window.add_init_script(f"{lacking} = () => false")
+    opened = check_book.Visit(window, (folder / "both.html").as_uri())
+    other = visit("both.html")
+    ends = []
+    for page in (opened.page, other.page):
+        load_all(page)
+        ends.append(page.evaluate(end_after(30), True))
+    assert opened.page.evaluate(
+        "!document.querySelector('figure').motionlab.dreamer.network.leave.layer.arrays"
+    )
+    for plain, fast in zip(*ends, strict=True):
+        assert 0 < np.abs(np.array(plain) - fast).max() < 1e-3  # metres
+    assert opened.troubles == []
+    window.close()
 
 
 def test_a_dancer_goes_on_as_in_python(visit, dancer):

@@ -2,16 +2,28 @@
 import { readFileSync } from "node:fs";
 import { smoothed } from "../../../web/src/drawing/shapes.js";
 import { decode } from "../../../web/src/motion.js";
+import { Linear } from "../../../web/src/network/affine.js";
 import { Dreamer } from "../../../web/src/network/dreamer.js";
 import { guide, GuidedWalk, pickStart, recently, Steering, wanted } from "../../../web/src/network/guided.js";
+import { Lstm } from "../../../web/src/network/lstm.js";
 import { LstmGmm } from "../../../web/src/network/lstm_gmm.js";
 import { Random } from "../../../web/src/network/mixture.js";
 import { Path } from "../../../web/src/network/path.js";
-import { readWeights } from "../../../web/src/network/weights.js";
+import { SimdLayer } from "../../../web/src/network/simd.js";
+import { readLayers, readWeights } from "../../../web/src/network/weights.js";
 
 const { scripts, look, ask } = JSON.parse(readFileSync(process.argv[2], "utf8"));
 for (const script of scripts) new Function(readFileSync(script, "utf8"))();
 const weights = (name) => readWeights(globalThis.motionlabWeights[name]);
+/** Browsers that can't run simd.wat, and pages that mayn't. */
+const refuse = (error) => () => { throw error; };
+const without = {
+  SIMD: () => { WebAssembly.validate = () => false; },
+  WebAssembly: () => { delete globalThis.WebAssembly; },
+  leave: () => { WebAssembly.Module = refuse(new WebAssembly.CompileError("the page's policy forbids it")); },
+  room: () => { WebAssembly.Memory = refuse(new RangeError("could not allocate memory")); },
+};
+without[ask.without]?.();
 const settings = { start: 0, temperature: 1, component_temperature: 1, memory: 0, noise: 0, characters: 1, seed: 0 };
 const list = (values) => Array.from(values);
 /** What may follow: a mixture, or a frame. */
@@ -51,6 +63,38 @@ const answers = {
       disturbed.push(list(dreamer.characters[0].input));
     }
     return { points, contacts, inputs: disturbed, noise };
+  },
+
+  /** What layers of networks say to inputs (a list a layer), when all networks are asked by turns. */
+  layers({ networks, inputs }) {
+    const read = networks.map((layers) => readLayers({ enter: layers, lstm: [], leave: layers[0] }).enter);
+    const said = inputs.map((given, n) => given.map((some, i) => {
+      const linear = new Linear(read[n][i]);
+      return { said: linear.of(some.map((values) => Float32Array.from(values))).map(list), simd: linear.layer instanceof SimdLayer };
+    }));
+    return said;
+  },
+
+  /** What an LSTM's layer keeps and says, a state for each character, after every one of `inputs` (frames, characters). */
+  lstm({ layer, inputs, states }) {
+    const { enter } = readLayers({ enter: [layer], lstm: [], leave: layer });
+    const lstm = new Lstm(enter[0], 0);
+    const kept = states.map(({ hidden, cell }) => ({ hidden: [Float32Array.from(hidden)], cell: [Float32Array.from(cell)] }));
+    return inputs.map((frame) => {
+      lstm.step(frame.map((values) => Float32Array.from(values)), kept);
+      return kept.map(({ hidden, cell }) => ({ hidden: list(hidden[0]), cell: list(cell[0]) }));
+    });
+  },
+
+  /** How far apart simd.wat and plain JavaScript are after some frames from one seed, in normalised units. */
+  apart({ name, frames, change }) {
+    const dreams = [weights(name)];
+    without.SIMD();
+    dreams.push(weights(name));
+    const [fast, plain] = dreams.map((read) => new Dreamer(read, look, { ...settings, ...change }));
+    for (const dreamer of [fast, plain]) dreamer.reach(frames);
+    const worst = fast.characters.map(({ input }, k) => Math.max(...input.map((value, i) => Math.abs(value - plain.characters[k].input[i]))));
+    return { worst, simd: [fast, plain].map(({ network }) => network.leave.layer instanceof SimdLayer) };
   },
 
   /** A frame after one that was no number. */

@@ -1,5 +1,6 @@
 // An LSTM layer, a frame at a time.
 import { Linear } from "./affine.js";
+import { SimdLayer } from "./simd.js";
 
 const sigmoid = (x) => 1 / (1 + Math.exp(-x));
 
@@ -21,7 +22,8 @@ export class Lstm {
       this.joined[k].set(hidden[this.depth], this.below);
     });
     const gates = this.gates.of(this.joined.slice(0, states.length));
-    states.forEach(({ hidden, cell }, k) => this.remember(gates[k], hidden[this.depth], cell[this.depth]));
+    const faster = this.gates.layer instanceof SimdLayer ? this.gates.layer : this;
+    states.forEach(({ hidden, cell }, k) => faster.remember(gates[k], hidden[this.depth], cell[this.depth]));
   }
 
   /** `gates` holds input, forget, cell and output, one after the other, as torch's. */

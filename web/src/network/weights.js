@@ -1,5 +1,6 @@
 // The weights as motionlab/viewer/live/network_weights.py writes them, read back. They come as a script,
 // because a page opened from disk may load scripts and nothing else.
+import { simdLayers } from "./simd.js";
 
 const SHELF = "motionlabWeights"; // where the scripts put what they bring
 
@@ -27,33 +28,43 @@ function numbers(text, Kind) {
 
 const floats = (text) => numbers(text, Float32Array);
 
-/** A matrix whose rows are a multiple of four (see affine.js); int8 rows have a scale each. */
+/** A layer whose rows are a multiple of four (see affine.js): `weight`, or `whole` numbers and a scale a row. */
 function readLayer({ columns, bias, weight, scales }) {
   const given = floats(bias);
   const rows = 4 * Math.ceil(given.length / 4);
-  const layer = { rows, columns, bias: new Float32Array(rows), weight: new Float32Array(rows * columns) };
+  const layer = { rows, columns, bias: new Float32Array(rows) };
   layer.bias.set(given);
-  if (!scales) {
-    layer.weight.set(floats(weight));
-    return layer;
-  }
-  const scale = floats(scales);
-  const small = numbers(weight, Int8Array);
-  for (let at = 0; at < small.length; at++) layer.weight[at] = small[at] * scale[Math.floor(at / columns)];
+  if (scales) return { ...layer, whole: numbers(weight, Int8Array), scales: floats(scales) };
+  layer.weight = new Float32Array(rows * columns);
+  layer.weight.set(floats(weight));
   return layer;
+}
+
+/** The same with `weight`, for plain JavaScript. */
+function multiplied({ whole, scales, ...layer }) {
+  if (!whole) return layer;
+  const weight = new Float32Array(layer.rows * layer.columns);
+  for (let at = 0; at < whole.length; at++) weight[at] = whole[at] * scales[Math.floor(at / layer.columns)];
+  return { ...layer, weight };
+}
+
+/** All layers of a network, for simd.wat where it can run. */
+export function readLayers({ enter, lstm, leave }) {
+  const read = [...enter, ...lstm, leave].map(readLayer);
+  const layers = simdLayers(read) ?? read.map(multiplied);
+  return { enter: layers.slice(0, enter.length), lstm: layers.slice(enter.length, -1), leave: layers.at(-1) };
 }
 
 /** All that a Dreamer needs: the network, the body's encoding, and states to start from. */
 export function readWeights(file) {
   const { kind, fps, kept, encoding } = file;
-  const { enter, lstm, leave } = file.layers;
   const starts = file.starts.map(({ name, frame, hidden, cell, noise }) => ({ name, frame: floats(frame), hidden: floats(hidden), cell: floats(cell), noise: floats(noise) }));
   return {
     kind,
     fps,
     starts,
     encoding,
-    layers: { enter: enter.map(readLayer), lstm: lstm.map(readLayer), leave: readLayer(leave) },
+    layers: readLayers(file.layers),
     settings: { ...file.settings, kept: kept.length },
     normalizer: { kept, mean: floats(file.mean), std: floats(file.std) },
   };

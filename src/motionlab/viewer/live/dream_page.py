@@ -1,7 +1,7 @@
 """A network that dreams in a built page: it runs in the reader's browser, without end.
 
 A page has no kernel. So the weights travel as a script beside the page, rounded to a byte each, and
-are loaded when the reader asks for them; web/src/network/ holds the network in plain JavaScript.
+are loaded when the reader asks for them; web/src/network/ holds the network in JavaScript.
 Until then, and where nothing can be loaded, the figure plays clips that were sampled beforehand.
 """
 
