@@ -117,7 +117,7 @@ export class Dreamer {
   /** Channels that never vary are their mean. */
   denormalize(values) {
     const { kept, mean, std } = this.normalizer;
-    const row = Float32Array.from(mean);
+    const row = mean.slice();
     kept.forEach((channel, i) => { row[channel] += values[i] * std[channel]; });
     return row;
   }

@@ -6,9 +6,11 @@ export function toMixture(numbers, input, { components, kept, skip, reach, floor
   const size = components * kept;
   const means = numbers.slice(components, components + size);
   const stds = numbers.slice(components + size, components + 2 * size);
-  for (let i = 0; i < size; i++) {
-    means[i] = skip * input[i % kept] + reach * means[i]; // a share of the present frame
-    stds[i] = reach * Math.exp(stds[i]) + floor[i % kept];
+  for (let at = 0; at < size; at += kept) {
+    for (let i = 0; i < kept; i++) {
+      means[at + i] = skip * input[i] + reach * means[at + i]; // a share of the present frame
+      stds[at + i] = reach * Math.exp(stds[at + i]) + floor[i];
+    }
   }
   return { logWeights, means, stds, kept };
 }
@@ -24,7 +26,9 @@ export function choose({ logWeights }, random, { component_temperature }) {
 /** The point of a component's Gaussian that `noise` stands for, in deviations. */
 export function point({ means, stds, kept }, component, noise, { temperature }) {
   const at = component * kept;
-  return Float32Array.from(noise, (value, i) => means[at + i] + temperature * stds[at + i] * value);
+  const drawn = new Float32Array(kept);
+  for (let i = 0; i < kept; i++) drawn[i] = means[at + i] + temperature * stds[at + i] * noise[i];
+  return drawn;
 }
 
 /** `count` numbers of noise with a memory (motionlab/models/noise.py); the noise before may be empty. */

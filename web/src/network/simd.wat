@@ -133,17 +133,14 @@
     (local.set $x (f32x4.neg (f32x4.max (f32x4.min (local.get $x) (f32x4.splat (f32.const 80))) (f32x4.splat (f32.const -80)))))
     (local.set $twos (f32x4.nearest (f32x4.mul (local.get $x) (f32x4.splat (f32.const 1.4426950409)))))
     (local.set $rest (f32x4.sub (local.get $x) (f32x4.mul (local.get $twos) (f32x4.splat (f32.const 0.6931471806)))))
-    ;; exp(rest), as a series: 1 + rest (1 + rest/2 (1 + rest/3 (1 + rest/4 (1 + rest/5 (1 + rest/6)))))
-    (local.set $x (call $and_one (local.get $rest) (f32x4.splat (f32.const 1)) (f32.const 0.1666666667)))
-    (local.set $x (call $and_one (local.get $rest) (local.get $x) (f32.const 0.2)))
-    (local.set $x (call $and_one (local.get $rest) (local.get $x) (f32.const 0.25)))
-    (local.set $x (call $and_one (local.get $rest) (local.get $x) (f32.const 0.3333333333)))
-    (local.set $x (call $and_one (local.get $rest) (local.get $x) (f32.const 0.5)))
-    (local.set $x (call $and_one (local.get $rest) (local.get $x) (f32.const 1)))
+    ;; exp(rest), as a series: 1 + rest + rest²/2 + rest³/6 + ... + rest⁶/720
+    (local.set $x (f32x4.splat (f32.const 0.001388888889)))
+    (local.set $x (f32x4.add (f32x4.mul (local.get $x) (local.get $rest)) (f32x4.splat (f32.const 0.008333333333))))
+    (local.set $x (f32x4.add (f32x4.mul (local.get $x) (local.get $rest)) (f32x4.splat (f32.const 0.04166666667))))
+    (local.set $x (f32x4.add (f32x4.mul (local.get $x) (local.get $rest)) (f32x4.splat (f32.const 0.1666666667))))
+    (local.set $x (f32x4.add (f32x4.mul (local.get $x) (local.get $rest)) (f32x4.splat (f32.const 0.5))))
+    (local.set $x (f32x4.add (f32x4.mul (local.get $x) (local.get $rest)) (f32x4.splat (f32.const 1))))
+    (local.set $x (f32x4.add (f32x4.mul (local.get $x) (local.get $rest)) (f32x4.splat (f32.const 1))))
     ;; times 2^twos: added to the exponent, which begins at bit 23 of a float
     (local.set $x (i32x4.add (local.get $x) (i32x4.shl (i32x4.trunc_sat_f32x4_s (local.get $twos)) (i32.const 23))))
-    (f32x4.div (f32x4.splat (f32.const 1)) (f32x4.add (f32x4.splat (f32.const 1)) (local.get $x))))
-
-  ;; 1 + share * x * y
-  (func $and_one (param $x v128) (param $y v128) (param $share f32) (result v128)
-    (f32x4.add (f32x4.splat (f32.const 1)) (f32x4.mul (f32x4.mul (f32x4.splat (local.get $share)) (local.get $x)) (local.get $y)))))
+    (f32x4.div (f32x4.splat (f32.const 1)) (f32x4.add (f32x4.splat (f32.const 1)) (local.get $x)))))
