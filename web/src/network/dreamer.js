@@ -5,6 +5,7 @@ import { JointAngles } from "./joint_angles.js";
 import { LiveTrack } from "./live_track.js";
 import { LstmGmm } from "./lstm_gmm.js";
 import { Random } from "./mixture.js";
+import { Refiner } from "./refiner.js";
 import { RootRelative } from "./root_relative.js";
 
 const NETWORKS = { AcLstm, LstmGmm };
@@ -19,6 +20,7 @@ export class Dreamer {
     this.network = new NETWORKS[weights.kind](weights.layers, weights.settings);
     this.encoding = new ENCODINGS[weights.encoding.kind](weights.encoding);
     this.normalizer = weights.normalizer;
+    this.refiner = weights.refiner && new Refiner(weights.refiner, this.encoding, this);
     this.starts = weights.starts;
     this.fps = weights.fps;
     this.look = look;
@@ -57,9 +59,16 @@ export class Dreamer {
       track: new LiveTrack(this.encoding, this.fps, this.last, this.look),
     };
     [character.next] = this.network.predict([character]);
+    character.refining = this.refiner?.begin(start.frame);
     this.characters[number] = character;
     this.tracks[number] = character.track;
-    this.show(character, start.frame);
+    const [shown] = this.refined([start.frame], [character]);
+    this.show(character, shown);
+  }
+
+  /** What is shown of rows that the network drew: it goes on from what it drew itself. */
+  refined(rows, characters) {
+    return this.refiner ? this.refiner.refine(rows, characters.map(({ refining }) => refining)) : rows;
   }
 
   /** The first character begins anew at a place, as frame 0, alone and with all of `seconds` kept. */
@@ -82,9 +91,10 @@ export class Dreamer {
       character.input = noise ? drawn[k].map((value) => value + noise * character.random.normal()) : drawn[k];
     });
     const next = this.network.step(this.characters);
+    const rows = this.refined(drawn.map((values) => this.denormalize(values)), this.characters);
     this.last++;
     this.characters.forEach((character, k) => {
-      const row = this.denormalize(drawn[k]);
+      const row = rows[k];
       if (!row.every(Number.isFinite)) {
         this.exploded++;
         return this.enter(k);

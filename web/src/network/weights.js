@@ -55,6 +55,12 @@ export function readLayers({ enter, lstm, leave }) {
   return { enter: layers.slice(0, enter.length), lstm: layers.slice(enter.length, -1), leave: layers.at(-1) };
 }
 
+/** A refiner of what the network makes (refiner.js), whose channels it shares. */
+function readRefiner({ layers, settings, effectors }, fps, kept) {
+  const { joints, mean, std } = effectors;
+  return { layers: readLayers(layers), settings: { ...settings, fps, kept }, effectors: { joints, mean: floats(mean), std: floats(std) } };
+}
+
 /** All that a Dreamer needs: the network, the body's encoding, and states to start from. */
 export function readWeights(file) {
   const { kind, fps, kept, encoding } = file;
@@ -66,6 +72,7 @@ export function readWeights(file) {
     encoding,
     layers: readLayers(file.layers),
     settings: { ...file.settings, kept: kept.length },
+    refiner: file.refiner && readRefiner(file.refiner, fps, kept.length),
     normalizer: { kept, mean: floats(file.mean), std: floats(file.std) },
   };
 }

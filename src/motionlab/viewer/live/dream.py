@@ -22,6 +22,7 @@ def dream(
     color: str = "RNN",
     caption: str | None = None,
     height: int = 380,
+    refiner: nn.Module | None = None,
 ) -> Any:
     """Let a trained network go on from one of its starts, under sliders.
 
@@ -37,12 +38,15 @@ def dream(
     color : a method's name or a colour.
     caption : a text below the figure.
     height : of the picture, pixels.
+    refiner : a `Refiner` of what the model makes; what is shown is refined, and the model goes on
+        from what it made itself.
 
     Raises
     ------
-    ViewerError : another kind of model, or one without starts.
+    ViewerError : another kind of model, one without starts, or a refiner of other features.
     """
     look = {"trail": trail, "color": palette.check_color(color), "height": height}
+    look["refiner"] = refiner
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
         return page_figure(model, characters, caption, **look)
     return controls(model, seconds, characters, caption, **look)

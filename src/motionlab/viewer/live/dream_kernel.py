@@ -88,7 +88,9 @@ def _sampled(model: nn.Module, values: dict[str, Any], look: dict[str, Any]) -> 
     frames = max(1, round(values.pop("seconds") * model.fps))
     start, count = values.pop("start"), values.pop("characters")
     state = model.starts[[start] * count]
-    tracks = sampled_tracks(model, state, frames, color=look["color"], **values)
+    tracks = sampled_tracks(
+        model, state, frames, color=look["color"], refiner=look["refiner"], **values
+    )
     return payload(
         tracks,
         model.fps,

@@ -29,6 +29,7 @@ def page_figure(
     trail: str | int | Sequence[str | int] | None = None,
     color: str = "RNN",
     height: int = 380,
+    refiner: nn.Module | None = None,
 ) -> NetworkFigure:
     """What `dream` is in a built page: no kernel, no server, also from disk.
 
@@ -39,10 +40,12 @@ def page_figure(
     check_known(model)
     check_starts(model)
     color = palette.check_color(color)
-    weights = weights_script(model, name_of(model))
+    weights = weights_script(model, name_of(model), refiner=refiner)
     sampling = getattr(model, "sampling", {})
     frames = round(seconds * model.fps)
-    tracks = sampled_tracks(model, model.starts, frames, seed=0, color=color, **sampling)
+    tracks = sampled_tracks(
+        model, model.starts, frames, seed=0, color=color, refiner=refiner, **sampling
+    )
     common = {"height": height, "autoplay": True, "trail": trail_of(trail, tracks)}
     clips = [payload([track], model.fps, follow=True, overlay=False, **common) for track in tracks]
     live = {**common, **live_of(model, weights, tracks, color)}
@@ -54,6 +57,6 @@ def page_figure(
         "controls": [
             asdict(c) | {"value": values.get(c.name, c.value)} for c in controls_of(model)
         ],
-        "facts": provenance(model, weights),
+        "facts": provenance(model, weights, refiner),
     }
     return NetworkFigure(content, weights, still_picture(tracks[0]), caption)

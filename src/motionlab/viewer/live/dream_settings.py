@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from ...encodings import JointAngles
 from ...errors import ViewerError
+from .network_weights import check_refiner
 from .player import Track
 from .show import trail_points
 
@@ -62,12 +63,22 @@ def check_starts(model: nn.Module) -> None:
 
 @torch.no_grad()
 def sampled_tracks(
-    model: nn.Module, state: Any, frames: int, *, seed: int, color: str, **sampling: float
+    model: nn.Module,
+    state: Any,
+    frames: int,
+    *,
+    seed: int,
+    color: str,
+    refiner: nn.Module | None = None,
+    **sampling: float,
 ) -> list[Track]:
-    """What a player shows of motions that go on from a state, its own frame first."""
+    """What a player shows of motions that go on from a state, its own frame first; refined, if by one."""
     chance = torch.Generator(next(model.parameters()).device).manual_seed(seed)
     sampled = model.generate(frames, state, generator=chance, **sampling)
     features = torch.cat([state.frame[:, None].to(sampled), sampled], dim=1).cpu()
+    if refiner is not None:
+        check_refiner(model, refiner)
+        features = refiner(features)
     encoding = model.encoding
     # Features of points have them: through `to_motion` they would be bent to the bones' lengths.
     points, contacts = encoding.positions(features), encoding.contacts(features)

@@ -102,7 +102,9 @@ def live_of(
     }
 
 
-def provenance(model: nn.Module, weights: WeightsScript) -> list[tuple[str, str]]:
+def provenance(
+    model: nn.Module, weights: WeightsScript, refiner: nn.Module | None = None
+) -> list[tuple[str, str]]:
     """What a reader may want to know of the weights; as much of it as the model says."""
     about = getattr(model, "about", {})
     parameters = sum(parameter.numel() for parameter in model.parameters())
@@ -113,6 +115,7 @@ def provenance(model: nn.Module, weights: WeightsScript) -> list[tuple[str, str]
         "Weights": about.get("name"),
         "sha256": getattr(model, "hash", None),
         "Network": f"{lstm}, {mixture}{parameters:,} numbers",
+        "Refined by": getattr(refiner, "about", {}).get("name", refiner and type(refiner).__name__),
         "In this page": f"{weights.file}: whole numbers of a byte, and a scale for each row",
         "Made by": about.get("command"),
         "Seed": made.get("seed"),

@@ -47,16 +47,20 @@ class WeightsScript:
         return path
 
 
-def weights_script(model: nn.Module, name: str, rounded: bool = True) -> WeightsScript:
+def weights_script(
+    model: nn.Module, name: str, rounded: bool = True, refiner: nn.Module | None = None
+) -> WeightsScript:
     """All that web/src/network/weights.js reads; `rounded` to a byte a weight, or float32.
 
-    Raises ViewerError if the browser can't run the model.
+    `refiner`: of what the model makes, a `Refiner` on the same features, to be run with it.
+
+    Raises ViewerError if the browser can't run the model, or the refiner isn't for it.
     """
     check_known(model)
     settings, layers = _taken_apart(model)
     packed = {part: [_pack(*layer, rounded) for layer in group] for part, group in layers.items()}
     normalizer, starts = model.normalizer, model.starts
-    content = {
+    content = ({} if refiner is None else {"refiner": _refiner(model, refiner, rounded)}) | {
         "kind": type(model).__name__,
         "settings": settings,
         "fps": model.fps,
@@ -104,6 +108,21 @@ def check_known(model: nn.Module) -> None:
         )
 
 
+def check_refiner(model: nn.Module, refiner: nn.Module) -> None:
+    """Raise ViewerError if it is none, or refines other features than those of a model."""
+    same = type(refiner).__name__ == "Refiner"
+    same = same and refiner.encoding.config() == model.encoding.config()
+    parts = ("mean", "std", "kept")
+    for part in parts if same else ():
+        its, own = (getattr(each.normalizer, part) for each in (refiner, model))
+        same = same and torch.equal(its, own)
+    if not same:
+        raise ViewerError(
+            f"{type(refiner).__name__} can't refine what this model makes: it must be a Refiner on "
+            "the same features, normalised alike."
+        )
+
+
 # -- networks ---------------------------------------------------------------------------------------
 
 
@@ -123,6 +142,32 @@ def _taken_apart(model: nn.Module) -> tuple[dict[str, Any], dict[str, list[Layer
         "floor": model.floor.tolist(),
     }
     return settings, {"enter": enter, "lstm": lstm, "leave": leave}
+
+
+def _refiner(model: nn.Module, refiner: nn.Module, rounded: bool) -> dict[str, Any]:
+    """What refiner.js needs beside the model's own encoding and normaliser."""
+    check_refiner(model, refiner)
+    leave = [layer for layer in (refiner.leave, refiner.aside) if layer is not None]
+    weight, bias = (
+        torch.cat([getattr(layer, part) for layer in leave]) for part in ("weight", "bias")
+    )
+    w_ih, w_hh, b_ih, b_hh = refiner.lstm.all_weights[0]
+    enter = refiner.enter[0]
+    return {
+        "settings": {"reach": refiner.reach, "slow": refiner.slow},
+        "layers": {
+            "enter": [_pack([enter.weight], enter.bias, rounded)],
+            "lstm": [_pack([w_ih, w_hh], b_ih + b_hh, rounded)],
+            "leave": _pack([weight], bias, rounded),
+        },
+        "effectors": {
+            "joints": [
+                refiner.encoding.skeleton.role(role) for role in refiner.encoding.effector_names
+            ],
+            "mean": _base64(refiner.effectors.mean),
+            "std": _base64(refiner.effectors.std),
+        },
+    }
 
 
 def _pack(matrices: list[Tensor], bias: Tensor, rounded: bool) -> dict[str, Any]:
