@@ -17,7 +17,7 @@ import motionlab
 from motionlab.feet.lock import lock
 
 SECONDS = 10
-LIMITS = {"one clip (s)": 2.0, "batch / loop": 1 / 5}
+LIMITS = {"one clip (s)": 2.0, "batch / loop": 0.15}
 
 
 @dataclass

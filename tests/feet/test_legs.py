@@ -23,8 +23,8 @@ from rig_names import CONVENTIONS, names_of, renamed
 from motionlab import Skeleton, contacts
 from motionlab.datasets import gaits
 from motionlab.errors import MotionError, SkeletonError
-from motionlab.feet.contacts import stands_on_floor
-from motionlab.feet.legs import knee_fronts, leg_joints
+from motionlab.feet.contacts import foot_points, stands_on_floor
+from motionlab.feet.legs import PARTS, knee_fronts, leg_joints, legs_alone
 from motionlab.solvers import lock_feet
 
 CANONICAL = Skeleton.canonical()
@@ -73,6 +73,27 @@ def straight_legged(motion):
     for side in ("left", "right"):
         rotations[:, CANONICAL.role(f"{side}_lower_leg")] = torch.eye(3)
     return replace(motion, rotations=rotations)
+
+
+@pytest.mark.parametrize("rig", [*RIGS, "joints between"])
+def test_legs_alone_are_where_those_of_the_whole_body_are(rig):
+    motion = with_joints_between(walk()) if rig == "joints between" else redrawn(walk(), RIGS[rig])
+    legs, kept = legs_alone(motion.skeleton)
+    alone = replace(motion, skeleton=legs, rotations=motion.rotations[:, kept])
+    whole, found = leg_joints(motion.skeleton), leg_joints(legs)
+    for part in PARTS:
+        assert [kept[joint] for joint in found[part]] == whole[part]
+        where = (m.positions()[:, joints[part]] for m, joints in ((alone, found), (motion, whole)))
+        assert torch.allclose(*where, atol=1e-5)
+    assert legs.joints < motion.skeleton.joints
+    assert stands_on_floor(legs) == stands_on_floor(motion.skeleton)
+
+
+def test_a_leg_whose_toes_are_said_to_be_none_has_none_alone():
+    skeleton = replace(CANONICAL, roles={"left_toes": "", "right_toes": ""})
+    legs, kept = legs_alone(skeleton)
+    assert "left_toes" not in legs.roles
+    assert foot_points(legs)[1] == legs.role("left_foot")
 
 
 @pytest.mark.parametrize("rig", RIGS)

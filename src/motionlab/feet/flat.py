@@ -14,6 +14,8 @@ import roma
 import torch
 from torch import Tensor
 
+from ..ik.turns import length
+
 STILL = 0.15  # metres a second, of what does not move at all
 STEP = 0.06  # metres by which what one foot stands on is higher than what the other does
 # A flat foot points so many radians below the horizontal, and its toes so many down or up from
@@ -31,7 +33,7 @@ def steps(points: Tensor) -> Tensor:
     """
     if points.shape[-3] == 1:
         return points.new_zeros(points.shape[:-1])
-    step = points.diff(dim=-3).norm(dim=-1)
+    step = length(points.diff(dim=-3))
     before = torch.cat([step[..., :1, :], step], dim=-2)
     return torch.minimum(before, torch.cat([step, step[..., -1:, :]], dim=-2))
 

@@ -7,13 +7,14 @@ points, and the knee of a leg that stays straight points where the hips face.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 
 import torch
 from torch import Tensor
 
 from ..errors import SkeletonError
-from ..ik.turns import unit
+from ..ik.turns import dot, length, unit
 from ..roles import SIDES
 from ..skeleton import Skeleton
 from .contacts import foot_points, rest_heights, stands_on_floor
@@ -47,6 +48,35 @@ def leg_joints(skeleton: Skeleton) -> dict[str, list[int]]:
     return joints | {"toes": [foot_points(skeleton)[1], foot_points(skeleton)[3]]}
 
 
+@lru_cache(maxsize=16)
+def legs_alone(skeleton: Skeleton) -> tuple[Skeleton, list[int]]:
+    """The legs, with what they hang on and their toes' tips, and which joints of the whole these are.
+
+    Where legs are does not hang on arms: to leave these out is to save half the kinematics.
+    """
+    joints, toes = leg_joints(skeleton), foot_points(skeleton)
+    kept = {joint for joint, above in enumerate(skeleton.parents) if above in toes}
+    for point in toes:
+        while point >= 0:
+            kept.add(point)
+            point = skeleton.point_parents[point]
+    kept = sorted(joint for joint in kept if joint < skeleton.joints)
+    number = {joint: i for i, joint in enumerate(kept)} | {-1: -1}
+    ends = [i for i, above in enumerate(skeleton.end_parents) if above in toes + joints["foot"]]
+    legs = Skeleton(
+        tuple(skeleton.names[joint] for joint in kept),
+        tuple(number[skeleton.parents[joint]] for joint in kept),
+        skeleton.offsets[kept],
+        tuple(number[skeleton.end_parents[i]] for i in ends),
+        skeleton.end_offsets[ends],
+        roles={
+            role: skeleton.names[skeleton.roles[role]] if role in skeleton.roles else ""
+            for role in (f"{side}_{part}" for side in SIDES for part in PARTS)
+        },
+    )
+    return legs, kept
+
+
 def leg_lengths(skeleton: Skeleton, points: Tensor) -> Tensor:
     """Lengths (2, 2) in metres of thigh and shank, each left first, as they are in motion.
 
@@ -63,7 +93,7 @@ def leg_lengths(skeleton: Skeleton, points: Tensor) -> Tensor:
     joints = leg_joints(skeleton)
     lengths = []
     for part, child in pairwise(PARTS[:3]):
-        bones = (points[..., joints[child], :] - points[..., joints[part], :]).norm(dim=-1)
+        bones = length(points[..., joints[child], :] - points[..., joints[part], :])
         lengths.append(bones.reshape(-1, 2).median(dim=0).values)
         for side, short in zip(SIDES, (lengths[-1] < _BONE).tolist(), strict=True):
             if short:
@@ -103,15 +133,15 @@ def knee_fronts(skeleton: Skeleton, points: Tensor, world: Tensor) -> Tensor:
         front = torch.zeros_like(mean)
     else:
         front = front.to(points)
-        doubt = mean.norm(dim=-1) - (mean * front).sum(-1)
+        doubt = mean.norm(dim=-1) - dot(mean, front)
         sure = (doubt < _DOUBT).all(-1, keepdim=True)  # a rest pose wrong of one leg is no witness
     if not sure.all():
         bent = _bends(hips, knees, ankles)
         # who bends backwards is a broken figure, and no other rig
-        bent = bent * ((bent * ahead).sum(-1, keepdim=True) > 0)
+        bent = bent * (dot(bent, ahead, keepdim=True) > 0)
         seen = unit(_in_frames(thighs, bent + _STRAIGHT * ahead).mean(-3, keepdim=True))
         front = torch.where(sure[..., None], front, seen)
-    return (thighs * front[..., None, :]).sum(-1)
+    return dot(thighs, front[..., None, :])
 
 
 def flat_toes(skeleton: Skeleton, points: Tensor, held: Tensor) -> Tensor:
@@ -156,10 +186,10 @@ def _facing(hips: Tensor, ankles: Tensor) -> Tensor:
 
 def _in_frames(frames: Tensor, vectors: Tensor) -> Tensor:
     """Vectors (..., 3) of the world in frames (..., 3, 3)."""
-    return (frames * vectors[..., :, None]).sum(-2)
+    return dot(frames.mT, vectors[..., None, :])
 
 
 def _bends(hips: Tensor, knees: Tensor, ankles: Tensor) -> Tensor:
     """Out of the knees (..., 2, 3), at right angles to thighs, as long as the sine of the bend."""
     thigh, shank = unit(knees - hips), unit(ankles - knees)
-    return (shank * thigh).sum(-1, keepdim=True) * thigh - shank
+    return dot(shank, thigh, keepdim=True) * thigh - shank

@@ -15,11 +15,11 @@ from torch import Tensor
 from torch.nn.functional import max_pool1d, pad
 
 from ..errors import ModelError
-from ..ik.turns import shortest_turn, unit
+from ..ik.turns import dot, length, product, shortest_turn, unit
 from ..kinematics import forward_kinematics
 from ..motion import Motion
 from ..skeleton import Skeleton
-from .legs import PARTS, flat_toes, knee_fronts, leg_joints, leg_lengths
+from .legs import PARTS, flat_toes, knee_fronts, leg_joints, leg_lengths, legs_alone
 from .planting import off_the_floor, steps
 
 GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
@@ -96,24 +96,29 @@ def lock(
     root_positions and rotations like those given.
     """
     contacts = _checked(contacts, root_positions, floor, blend, fps)
-    joints = leg_joints(skeleton)
-    points, world = _forward(skeleton, root_positions, rotations)
-    leg_lengths(skeleton, points)  # refuses legs that lack a bone
-    toes = points[..., joints["toes"], :]  # (..., frames, 2, 3)
-    held = _clean(contacts & (steps(toes) * fps < FASTEST), fps)
-    held = _resting(held, steps(toes) * fps < RESTS)
-    flat = flat_toes(skeleton, points, held)
+    legs, kept = legs_alone(skeleton)
+    joints = leg_joints(legs)
+    points, world = _forward(legs, root_positions, rotations[..., kept, :, :])
+    leg_lengths(legs, points[..., :1, :, :])  # refuses legs that lack a bone
+    at = {part: points[..., joints[part], :] for part in PARTS}  # (..., frames, 2, 3)
+    toes = at["toes"]
+    speeds = steps(toes) * fps
+    held = _resting(_clean(contacts & (speeds < FASTEST), fps), speeds < RESTS)
+    flat = flat_toes(legs, points, held)
     ground = _ground(toes, held, flat, floor)
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
-        held = held & (_onto_places(toes, held, ground).norm(dim=-1) < FARTHEST)
+        held = held & (length(_onto_places(toes, held, ground)) < FARTHEST)
     shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
-    shift = _above(shift, points, joints, ground, ground - flat)
-    ankle = points[..., joints["foot"], :] + shift
+    shift = _above(shift, at, ground, ground - flat)
+    ankle = at["foot"] + shift
 
-    sunk = root_positions - _sink(points, ankle, joints, fps)
-    hips = points[..., joints["upper_leg"], :] + (sunk - root_positions)[..., None, :]
+    sunk = root_positions - _sink(at, ankle, fps)
+    hips = at["upper_leg"] + (sunk - root_positions)[..., None, :]
     toe_heights = toes[..., 1] + shift[..., 1] - (ground - flat)[..., None, :]
-    return sunk, _bent(skeleton, joints, points, world, rotations, hips, ankle, toe_heights)
+    rotations = rotations.clone()
+    for joint, turn in _bent(legs, joints, points, world, hips, ankle, toe_heights).items():
+        rotations[..., kept[joint], :, :] = turn
+    return sunk, rotations
 
 
 # -- where feet are to be ---------------------------------------------------------------------------
@@ -212,22 +217,20 @@ def _fading(distance: Tensor, blend: float) -> Tensor:
     return left * left * (3 - 2 * left)
 
 
-def _above(shift: Tensor, points: Tensor, joints: dict, ground: Tensor, floor: Tensor) -> Tensor:
+def _above(shift: Tensor, at: dict[str, Tensor], ground: Tensor, floor: Tensor) -> Tensor:
     """The shift, with feet lifted where they would be in the floor: ankles and toe joints."""
-    toe = points[..., joints["toes"], 1] + shift[..., 1] - ground[..., None, :]
-    ankle = points[..., joints["foot"], 1] + shift[..., 1] - floor[..., None, :]
+    toe = at["toes"][..., 1] + shift[..., 1] - ground[..., None, :]
+    ankle = at["foot"][..., 1] + shift[..., 1] - floor[..., None, :]
     lift = -torch.minimum(toe, ankle).clamp(max=0)
     return shift + torch.stack([torch.zeros_like(lift), lift, torch.zeros_like(lift)], dim=-1)
 
 
-def _sink(points: Tensor, ankle: Tensor, joints: dict, fps: float) -> Tensor:
+def _sink(at: dict[str, Tensor], ankle: Tensor, fps: float) -> Tensor:
     """How far the root comes down (..., frames, 3) for both legs to reach their ankles."""
-    hip, knee = points[..., joints["upper_leg"], :], points[..., joints["lower_leg"], :]
-    length = (knee - hip).norm(dim=-1) + (points[..., joints["foot"], :] - knee).norm(dim=-1)
-    was = (points[..., joints["foot"], :] - hip).norm(dim=-1)
-    moved = (ankle - points[..., joints["foot"], :]).norm(dim=-1)
-    stays = was.minimum(length) - (moved - NEAR).clamp(min=0)
-    reach = torch.maximum(REACH * length, stays)
+    hip, knee, foot = (at[part] for part in PARTS[:3])
+    longest = length(knee - hip) + length(foot - knee)
+    stays = length(foot - hip).minimum(longest) - (length(ankle - foot) - NEAR).clamp(min=0)
+    reach = torch.maximum(REACH * longest, stays)
     way = hip - ankle
     level = way[..., [0, 2]].square().sum(-1)
     needed = way[..., 1] - (reach.square() - level).clamp(min=1e-4).sqrt()
@@ -252,11 +255,11 @@ def _smoothed_over(values: Tensor, sigma: float) -> Tensor:
 
 
 def _bent(
-    skeleton: Skeleton, joints: dict, points: Tensor, world: Tensor, rotations: Tensor,
+    skeleton: Skeleton, joints: dict, points: Tensor, world: Tensor,
     hips: Tensor, ankle: Tensor, toe_heights: Tensor,
-) -> Tensor:  # fmt: skip
-    """Local rotations with legs that reach their ankles; feet keep the way they point."""
-    rotations = rotations.clone()
+) -> dict[int, Tensor]:  # fmt: skip
+    """Local rotations of legs that reach their ankles, by joint; feet keep the way they point."""
+    rotations = {}
     fronts = knee_fronts(skeleton, points, world)
     for i in range(2):
         upper, lower, foot, toes = (joints[part][i] for part in PARTS)
@@ -267,15 +270,15 @@ def _bent(
         shin = reach - knee
         # the smallest turns of the bones as they were, so that no bone is twisted
         turned = {
-            upper: shortest_turn(knee_was, knee) @ world[..., upper, :, :],
-            lower: shortest_turn(shin_was, shin) @ world[..., lower, :, :],
+            upper: product(shortest_turn(knee_was, knee), world[..., upper, :, :]),
+            lower: product(shortest_turn(shin_was, shin), world[..., lower, :, :]),
             foot: world[..., foot, :, :],
         }
         if foot != toes < skeleton.joints:  # a joint, not the end of the foot
             turned[toes] = _toes_up(skeleton, toes, world, toe_heights[..., i])
         for joint, whole in turned.items():
             above = _carried(skeleton, skeleton.parents[joint], turned, world)
-            rotations[..., joint, :, :] = above.mT @ whole
+            rotations[joint] = product(above.mT, whole)
     return rotations
 
 
@@ -289,7 +292,8 @@ def _carried(skeleton: Skeleton, joint: int, turned: dict[int, Tensor], world: T
         above = skeleton.parents[above]
     if above < 0 or above == joint:
         return turned.get(joint, world[..., joint, :, :])
-    return turned[above] @ world[..., above, :, :].mT @ world[..., joint, :, :]
+    stays = product(world[..., above, :, :].mT, world[..., joint, :, :])
+    return product(turned[above], stays)
 
 
 def _toes_up(skeleton: Skeleton, toes: int, world: Tensor, heights: Tensor) -> Tensor:
@@ -310,16 +314,16 @@ def _knee(knee_was: Tensor, shin_was: Tensor, reach: Tensor, front: Tensor) -> T
     a leg whose ankle is where it was keeps its knee, be it bent backwards or folded up.
     `two_bone`, which stays a little short of straight, would move that of a straight leg.
     """
-    thigh, shank = (bone.norm(dim=-1, keepdim=True) for bone in (knee_was, shin_was))
-    distance = reach.norm(dim=-1, keepdim=True).clamp(min=1e-9)
+    thigh, shank = (length(bone, keepdim=True) for bone in (knee_was, shin_was))
+    distance = length(reach, keepdim=True).clamp(min=1e-9)
     # law of cosines: how far down the line and how far beside it; a leg out of reach is straight
     along = (thigh**2 + distance**2 - shank**2) / (2 * distance)
     along = torch.minimum(torch.maximum(along, -thigh), thigh)
     beside = (thigh**2 - along**2).clamp(min=0).sqrt()
 
     line_was, line = unit(knee_was + shin_was), unit(reach)
-    aside = knee_was - (knee_was * line_was).sum(-1, keepdim=True) * line_was
-    aside = (shortest_turn(line_was, line) @ aside[..., None])[..., 0]
+    aside = knee_was - dot(knee_was, line_was, keepdim=True) * line_was
+    aside = dot(shortest_turn(line_was, line), aside[..., None, :])
     return along * line + beside * _aside(aside, beside, line, front)
 
 
@@ -329,9 +333,9 @@ def _aside(was: Tensor, beside: Tensor, line: Tensor, front: Tensor) -> Tensor:
     As it `was`; but a leg that was nearly straight or bent a little backwards, whose knee is to come
     out farther, says little or wrong of where to: so far as it comes out, its front says it.
     """
-    out = was.norm(dim=-1, keepdim=True)
-    front = unit(front - (front * line).sum(-1, keepdim=True) * line)
-    backwards = (was * front).sum(-1, keepdim=True) < 0
+    out = length(was, keepdim=True)
+    front = unit(front - dot(front, line, keepdim=True) * line)
+    backwards = dot(was, front, keepdim=True) < 0
     share = (2 - out / torch.where(backwards, BACKWARDS, STRAIGHT)).clamp(0, 1)
     return unit(was + share * 3 * (beside - out).clamp(min=1e-7) * front)
 

@@ -276,16 +276,17 @@ def _loose(touches: Tensor, fps: float, seconds: float) -> Tensor:
 
 def off_the_floor(toes: Tensor, height: Tensor, tip: Tensor) -> Tensor:
     """Toes (frames, 3, 3) pitched up where their tip would dip into the floor."""
-    length = tip.norm()
-    if length < _TIP:
+    long = tip.norm()
+    if long < _TIP:
         return toes
-    point = (toes @ tip) / length
-    least = ((_TIP - height) / length).clamp(-1, 0)
-    level = (1 - least**2).sqrt() / point[:, [0, 2]].norm(dim=-1).clamp(min=1e-6)
-    lifted = torch.stack([point[:, 0] * level, least, point[:, 2] * level], -1)
-    return torch.where(
-        (point[:, 1] < least)[:, None, None], shortest_turn(point, lifted) @ toes, toes
-    )
+    x, y, z = (sum(toes[:, i, k] * tip[k] for k in range(3)) / long for i in range(3))
+    least = ((_TIP - height) / long).clamp(-1, 0)
+    level = (1 - least**2).sqrt() / (x * x + z * z).sqrt().clamp(min=1e-6)
+    dips = y < least
+    point, lifted = torch.stack([x, y, z], -1), torch.stack([x * level, least, z * level], -1)
+    toes = toes.clone()
+    toes[dips] = shortest_turn(point[dips], lifted[dips]) @ toes[dips]
+    return toes
 
 
 def _stance(contacts: Tensor, reach: Tensor, ankle: Tensor, heights: Tensor) -> Tensor:
