@@ -114,8 +114,17 @@ def _no_bone(skeleton: Skeleton, side: str, part: str, child: str) -> SkeletonEr
 def knee_fronts(skeleton: Skeleton, points: Tensor, world: Tensor) -> Tensor:
     """Which way both knees point (..., frames, 2, 3), left first, were their legs straight.
 
-    In the frame of the thigh that is one direction for a whole motion. If the rest pose stands,
-    and hips face that way in the motion, it is where the hips face at rest; else the motion's.
+    Arguments as of `knee_front`.
+    """
+    thighs = world[..., leg_joints(skeleton)["upper_leg"], :, :]
+    return dot(thighs, knee_front(skeleton, points, world)[..., None, :])
+
+
+def knee_front(skeleton: Skeleton, points: Tensor, world: Tensor) -> Tensor:
+    """The same in the frames of the thighs, where it is one direction (..., 1, 2, 3) for a motion.
+
+    If the rest pose stands, and hips face that way in the motion, it is where the hips face at
+    rest; else the motion's.
 
     Parameters
     ----------
@@ -127,7 +136,7 @@ def knee_fronts(skeleton: Skeleton, points: Tensor, world: Tensor) -> Tensor:
     hips, knees, ankles = (points[..., joints[part], :] for part in PARTS[:3])
     ahead = _facing(hips, ankles)
     mean = _in_frames(thighs, ahead).mean(-3, keepdim=True)
-    front = _front_at_rest(skeleton)
+    front = front_at_rest(skeleton)
     if front is None:
         sure = mean.new_zeros(mean.shape[:-1], dtype=torch.bool)
         front = torch.zeros_like(mean)
@@ -141,7 +150,7 @@ def knee_fronts(skeleton: Skeleton, points: Tensor, world: Tensor) -> Tensor:
         bent = bent * (dot(bent, ahead, keepdim=True) > 0)
         seen = unit(_in_frames(thighs, bent + _STRAIGHT * ahead).mean(-3, keepdim=True))
         front = torch.where(sure[..., None], front, seen)
-    return dot(thighs, front[..., None, :])
+    return front
 
 
 def flat_toes(skeleton: Skeleton, points: Tensor, held: Tensor) -> Tensor:
@@ -168,7 +177,7 @@ def flat_toes(skeleton: Skeleton, points: Tensor, held: Tensor) -> Tensor:
     return torch.stack(found, -1)
 
 
-def _front_at_rest(skeleton: Skeleton) -> Tensor | None:
+def front_at_rest(skeleton: Skeleton) -> Tensor | None:
     """Where the hips face (2, 3), by the left and by the right leg; None if they don't stand."""
     joints, rest = leg_joints(skeleton), skeleton.rest_points
     hips, knees, ankles = (rest[joints[part]] for part in PARTS[:3])

@@ -40,7 +40,7 @@ _SHORTEST = 2  # frames
 # the middle of it: a short foot cannot roll as far as a long one.
 _STRAY = 0.025  # metres
 _DIP = 0.015  # metres by which an ankle may lie lower than in a flat foot
-_TIP = 0.003  # metres that the tip of the toes stays above the floor
+TIP = 0.003  # metres that the tip of the toes stays above the floor
 _ROLL, _ROUNDS = 0.5, 6  # radians that a heel may rise or sink about toes that are down
 _CLEAR = 0.35  # radians that toes may go up lest they scrape the floor in a swing
 _MENDED = 0.001  # metres that a leg is still too long or short when its heel has mended it
@@ -202,7 +202,7 @@ def let_go(planted: Foot, hip: Tensor, stretch: Tensor, longest: float, fps: flo
     left = _faded(_bend(length, longest) - wanted, touches, fps)
     ankle = hip + leg * (_length(wanted + left, longest) / length)[:, None]
     # toes that scrape the floor in a swing go up before the ankle does
-    room = ankle[:, 1].clamp(min=float(foot.sole.heights[0] - _DIP)) - foot.sole.heights[1] + _TIP
+    room = ankle[:, 1].clamp(min=float(foot.sole.heights[0] - _DIP)) - foot.sole.heights[1] + TIP
     clear = roma.rotmat_to_rotvec(off_the_floor(foot.foot, room, foot.sole.toes) @ foot.foot.mT)
     clear *= (_CLEAR / clear.norm(dim=-1, keepdim=True).clamp(min=_CLEAR)) * ~touches[:, None]
     foot = replace(foot, ankle=ankle, foot=roma.rotvec_to_rotmat(clear) @ foot.foot)
@@ -277,10 +277,10 @@ def _loose(touches: Tensor, fps: float, seconds: float) -> Tensor:
 def off_the_floor(toes: Tensor, height: Tensor, tip: Tensor) -> Tensor:
     """Toes (frames, 3, 3) pitched up where their tip would dip into the floor."""
     long = tip.norm()
-    if long < _TIP:
+    if long < TIP:
         return toes
     x, y, z = (sum(toes[:, i, k] * tip[k] for k in range(3)) / long for i in range(3))
-    least = ((_TIP - height) / long).clamp(-1, 0)
+    least = ((TIP - height) / long).clamp(-1, 0)
     level = (1 - least**2).sqrt() / (x * x + z * z).sqrt().clamp(min=1e-6)
     dips = y < least
     point, lifted = torch.stack([x, y, z], -1), torch.stack([x * level, least, z * level], -1)
