@@ -88,6 +88,9 @@ class Foot:
         """Labels without gaps and flickers; a contact that may be a flicker does not count yet."""
         on, away = list(labels), self.away if self.on else math.inf
         self.away = 0 if labels[0] else self.away + 1
+        if not any(labels) or (self.on and all(labels)):
+            self.on = labels[0]
+            return on
         for k, down in enumerate(labels):
             if down and 0 < away <= rules.gap:
                 on[max(k - away, 0) : k] = [True] * min(away, k)
@@ -153,7 +156,7 @@ class Foot:
         self.since, self.near, self.easing = self.since + 1, now, begin if comes else 0
         old = [_fade((self.since + k) / rules.blend) for k in range(len(toes))]
         if not comes:
-            shifts = [_times(share, self.last) for share in old]
+            shifts = [_times(share, self.last) if share else [0.0, 0.0, 0.0] for share in old]
         else:
             onto = [plus(place, -1, toe) for toe in toes[begin:]]
             shifts = [
@@ -197,5 +200,7 @@ def _times(share: float, a: Vector) -> Vector:
 
 def _fade(away: float) -> float:
     """From 1 at 0 to 0 at 1, level at both ends."""
-    left = min(max(1 - away, 0.0), 1.0)
+    if away >= 1:
+        return 0.0
+    left = 1 - away
     return left * left * (3 - 2 * left)

@@ -32,7 +32,7 @@ class _Frame:
 
     root: np.ndarray  # (3,) metres
     rotations: np.ndarray  # (joints, 3, 3), local
-    world: np.ndarray  # (leg joints, 3, 3)
+    world: np.ndarray  # (leg points, 3, 3)
     at: list[list[Vector]]  # metres: hips, knees, ankles, toes
     fronts: list[Vector]  # which way knees point
     tips: list[Vector]  # metres, from toe joints to the tips of toes
@@ -87,7 +87,7 @@ class LockStream:
         self._legs, self._kept = legs_alone(skeleton)
         joints = leg_joints(self._legs)
         self._points = np.array([joints[part] for part in PARTS])  # (4, 2)
-        self._levels = _levels(self._legs)
+        self._rest, self._levels = _rest_frames(self._legs), _levels(self._legs)
         toed = (self._points[3] < self._legs.joints) & (self._points[3] != self._points[2])
         self._toed = bool(toed.all())  # toes are joints, not the ends of feet
         self._above = np.array(self._legs.parents)[self._points[: 3 + self._toed]]
@@ -182,16 +182,13 @@ class LockStream:
         waiting.append(_Frame(root, rotations, world, at, fronts, tips, down, steps, longest))
 
     def _kinematics(self, root: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (leg points, 3) and world orientations (leg joints, 3, 3)."""
-        local = rotations[self._kept].astype(float)
-        world, points = np.empty_like(local), np.empty((self._legs.points, 3))
-        world[0], points[0] = local[0], root
-        for members, parents, offsets in self._levels:
-            above = world[parents]
-            points[members] = points[parents] + (above @ offsets)[..., 0]
-            if members[0] < len(world):
-                world[members] = above @ local[members]
-        return points, world
+        """Points (leg points, 3), and their frames' orientations (leg points, 3, 3) in the world."""
+        local = self._rest.copy()
+        local[: len(self._kept), :3, :3] = rotations[self._kept]
+        local[0, :3, 3] = root
+        for members, parents in self._levels:
+            local[members] = local[parents] @ local[members]  # in the world from here on
+        return local[:, :3, 3], local[:, :3, :3]
 
     def _give(self) -> tuple[np.ndarray, np.ndarray]:
         """The oldest frame that waits, its feet locked: root position and local rotations."""
@@ -276,20 +273,20 @@ class LockStream:
 # -- what is known beforehand -----------------------------------------------------------------------
 
 
-def _levels(skeleton: Skeleton) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Points as far from the root as each other, their parents, their offsets (points, 3, 1)."""
-    parents, offsets = skeleton.point_parents, torch.cat([skeleton.offsets, skeleton.end_offsets])
-    depth = [0]
+def _rest_frames(skeleton: Skeleton) -> np.ndarray:
+    """Each point's frame at rest in that of its parent (points, 4, 4), turn and offset in one."""
+    frames = np.eye(4)[None].repeat(skeleton.points, 0)
+    frames[:, :3, 3] = torch.cat([skeleton.offsets, skeleton.end_offsets]).numpy()
+    return frames
+
+
+def _levels(skeleton: Skeleton) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Points as far from the root as each other, and their parents."""
+    parents, depth = skeleton.point_parents, [0]
     for parent in parents[1:]:
         depth.append(depth[parent] + 1)
     rows = [[p for p in range(len(parents)) if depth[p] == d] for d in range(1, max(depth) + 1)]
-    joints = [[p for p in row if p < skeleton.joints] for row in rows]
-    ends = [list(range(skeleton.joints, skeleton.points))]
-    return [
-        (np.array(row), np.array(parents)[row], offsets[row].double().numpy()[..., None])
-        for row in joints + ends
-        if row
-    ]
+    return [(np.array(row), np.array(parents)[row]) for row in rows]
 
 
 def _tip(skeleton: Skeleton, toes: int) -> np.ndarray:

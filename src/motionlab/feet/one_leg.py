@@ -14,7 +14,7 @@ from .lock import BACKWARDS, NEAR, REACH, STRAIGHT
 from .planting import TIP
 
 Vector = Sequence[float]
-_LEAST = 1e-12  # metres; what is shorter has no direction
+_LEAST = 1e-12
 
 
 def knee(knee_was: Vector, shin_was: Vector, reach: Vector, front: Vector) -> list[float]:
@@ -95,5 +95,6 @@ def plus(a: Vector, share: float, b: Vector) -> list[float]:
 
 def unit(a: Vector) -> list[float]:
     """One long; zero stays zero."""
-    long = max(norm(a), _LEAST)
-    return [a[0] / long, a[1] / long, a[2] / long]
+    x, y, z = a
+    long = math.sqrt(x * x + y * y + z * z) or _LEAST
+    return [x / long, y / long, z / long]
