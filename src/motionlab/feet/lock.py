@@ -98,7 +98,7 @@ def lock(
     contacts = _checked(contacts, root_positions, floor, blend, fps)
     legs, kept = legs_alone(skeleton)
     joints = leg_joints(legs)
-    points, world = _forward(legs, root_positions, rotations[..., kept, :, :])
+    points, world = _forward(legs, root_positions, _picked(rotations, kept))
     leg_lengths(legs, points[..., :1, :, :])  # refuses legs that lack a bone
     at = {part: points[..., joints[part], :] for part in PARTS}  # (..., frames, 2, 3)
     toes = at["toes"]
@@ -338,6 +338,17 @@ def _aside(was: Tensor, beside: Tensor, line: Tensor, front: Tensor) -> Tensor:
     backwards = dot(was, front, keepdim=True) < 0
     share = (2 - out / torch.where(backwards, BACKWARDS, STRAIGHT)).clamp(0, 1)
     return unit(was + share * 3 * (beside - out).clamp(min=1e-7) * front)
+
+
+def _picked(rotations: Tensor, joints: list[int]) -> Tensor:
+    """Rotations (..., frames, joints, 3, 3) of some joints, the frames side by side in memory.
+
+    So `forward_kinematics` wants them, and brings them there in twice the time.
+    """
+    rows = [9 * joint + i for joint in joints for i in range(9)]
+    flat = rotations.reshape(-1, rotations.shape[-3] * 9).T
+    picked = flat.index_select(0, torch.tensor(rows, device=flat.device))
+    return picked.T.reshape(*rotations.shape[:-3], len(joints), 3, 3)
 
 
 def _forward(skeleton: Skeleton, root_positions: Tensor, rotations: Tensor):
