@@ -246,6 +246,14 @@ def test_weights_are_written_and_read_again(world, tmp_path):
     assert about == {"update": 3} and torch.equal(again(features), refiner(features))
 
 
+def test_weights_that_are_read_while_sampling_can_learn(world, tmp_path):
+    save_weights(tmp_path / "refiner.safetensors", world[2], {})
+    with torch.inference_mode():
+        again, _ = load_weights(tmp_path / "refiner.safetensors")
+    again(world[1]).sum().backward()
+    assert again.leave.weight.grad.abs().sum() > 0
+
+
 def test_what_cannot_be_refined_is_said(world):
     encoding, features, refiner, _ = world
     broken = features.clone()

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple, TypeVar
+
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -9,6 +14,8 @@ from ..errors import EncodingError
 from ..kinematics import forward_kinematics
 from ..skeleton import Skeleton
 from .path import turned
+
+Array = TypeVar("Array", Tensor, np.ndarray)
 
 
 def body_points(
@@ -43,6 +50,58 @@ def effector_joints(skeleton: Skeleton) -> dict[str, int]:
             )
         found[role] = skeleton.roles[role]
     return found
+
+
+class Chains(NamedTuple):
+    """The bones from the root to each end effector, all chains beside each other.
+
+    joints : their numbers in the body, the root first. levels : for each step away from the root, which
+    of these joints turns what is beyond it, an index an effector. offsets : (levels + 1, effectors, 3)
+    metres, from there to the next joint; a chain that has ended has no offset any more, so that it does
+    not matter which joint turns it.
+    """
+
+    joints: list[int]
+    levels: list[list[int]]
+    offsets: Tensor
+
+
+@lru_cache(maxsize=64)
+def effector_chains(skeleton: Skeleton) -> Chains:
+    """Those of hands, toes and head; raises EncodingError as `effector_joints` does."""
+    chains = []  # from the root to an end effector, without it: it carries nothing
+    ends = [*effector_joints(skeleton).values()]
+    for joint in ends:
+        chain: list[int] = []
+        while (joint := skeleton.parents[joint]) >= 0:
+            chain.insert(0, joint)
+        chains.append(chain)
+    joints = sorted({0}.union(*chains))
+    levels = [[0] * len(ends) for _ in range(max(map(len, chains)))]
+    with torch.inference_mode(False):  # made while sampling, it must serve when training
+        offsets = torch.zeros(len(levels) + 1, len(ends), 3)
+        for i, (chain, end) in enumerate(zip(chains, ends, strict=True)):
+            for level, joint in enumerate(chain):
+                levels[level][i] = joints.index(joint)
+            for level, joint in enumerate([*chain[1:], end], start=1):
+                offsets[level, i] = skeleton.offsets[joint]
+    return Chains(joints, levels, offsets)
+
+
+def chain_ends(local: Array, levels: Sequence[Sequence[int]], offsets: Array) -> Array:
+    """End effectors (effectors, 3, batch), metres from the root.
+
+    From the tips to the root: a point is turned by one joint after the other. That is a third of the
+    multiplications of forward kinematics, which must know how every joint lies in the world. It asks
+    for nothing but what tensors and arrays both know: single frames are calculated in numpy.
+
+    local : (joints, 3, 3, batch), rotations of `Chains.joints` relative to their parents.
+    levels, offsets : of `Chains`, the offsets an array if the rotations are one.
+    """
+    ends = offsets[-1][..., None]
+    for level in reversed(range(len(levels))):
+        ends = (local[levels[level]] * ends[:, None]).sum(2) + offsets[level][..., None]
+    return ends
 
 
 def moving(points: Tensor, steps: Tensor, fps: float, facing: Tensor | None = None) -> Tensor:

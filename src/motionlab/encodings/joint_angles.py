@@ -20,7 +20,7 @@ from .base import (
     contact_channels,
     skeleton_config,
 )
-from .effectors import body_points, effector_joints, moving
+from .effectors import body_points, chain_ends, effector_chains, effector_joints, moving
 from .limbs import Limbs
 from .mean_pose import check_pose, mean_pose_of
 from .path import Start, read_start, steps_between, walk
@@ -192,13 +192,18 @@ class JointAngles:
     def end_effectors(self, features: Tensor) -> Tensor:
         """Positions and velocities (..., frames, effectors, 6); see `Encoding.end_effectors`."""
         features = check_features(self, features)
-        tilt, joints = self._turns(features)
-        still = torch.zeros_like(features[..., 3])
-        place = torch.stack([still, features[..., 3], still], dim=-1)
-        rotations = torch.cat([tilt[..., None, :, :], joints], dim=-3)
-        points = body_points(self.skeleton, rotations, place)
-        points = points[..., list(effector_joints(self.skeleton).values()), :]
-        return moving(points, features[..., :3], self.fps, heading(tilt))
+        chains = effector_chains(self.skeleton)
+        tilt, joints = self._turns(features, chains.joints)
+        local = torch.cat([tilt[..., None, :, :], joints], dim=-3)
+        local = local.flatten(0, -4).permute(1, 2, 3, 0).contiguous()  # (joints, 3, 3, batch)
+        ends = chain_ends(local, chains.levels, chains.offsets.to(local))
+        points = ends.permute(2, 0, 1).unflatten(0, features.shape[:-1])
+        height = features[..., 3]
+        still = torch.zeros_like(height)
+        points = points + torch.stack([still, height, still], dim=-1)[..., None, :]
+        # a rotation vector without a y component does not turn its body about the vertical
+        facing = heading(tilt) if self.rotation == "euler" else None
+        return moving(points, features[..., :3], self.fps, facing)
 
     def contacts(self, features: Tensor) -> Tensor | None:
         """Left and right toe (..., frames, 2) as they are; None if not carried."""

@@ -50,7 +50,7 @@ def checked_features(model: _Model, features: Tensor) -> Tensor:
             f"Features have shape {shape}; this model needs (batch, frames, {dim}) with at least "
             "one frame."
         )
-    if not features.detach().sum().isfinite():
+    if not math.isfinite(features.detach().sum()):
         raise ModelError("Features hold a NaN or infinite value; cut such frames out first.")
     return features
 
@@ -83,9 +83,15 @@ def checked_state(model: _Model, state: State, what: str = "state") -> State:
                 f"{what} holds `{name}` of shape {tuple(part.shape)}, this model's is {size}. "
                 "State(state.frame, state.hidden, state.cell) is one without."
             )
-    if not all(part.isfinite().all() for part in state):
+    if not all(map(_finite, state)):
         raise ModelError(f"{what} holds a NaN or infinite value.")
-    return State(*(part.to(model.normalizer.mean) for part in state))
+    like = model.normalizer.mean
+    return State(*(part.to(like) for part in state))
+
+
+def _finite(part: Tensor) -> bool:
+    """Whether all numbers are finite; their sum tells at once, but may itself leave all bounds."""
+    return math.isfinite(part.detach().sum()) or bool(part.isfinite().all())
 
 
 def check_memory(memory: float) -> None:

@@ -15,8 +15,9 @@ from torch.nn.functional import softplus
 from ..encodings import JointAngles, Normalizer
 from ..encodings.path import turned
 from ..errors import ModelError
-from .checks import checked_features, checked_state
+from .checks import as_features, checked_features, checked_state
 from .recurrent import Recurrent
+from .refiner_step import step
 from .state import State
 
 _TOES = slice(0, 2)  # of the end effectors
@@ -101,7 +102,10 @@ class Refiner(Recurrent):
         ------
         ModelError : other features than this model's, NaN, or a state of another model or batch.
         """
-        features = torch.as_tensor(features)
+        stepped = step(self, features, state)  # a single frame, if it can be calculated faster
+        if stepped:
+            return stepped
+        features = as_features(self, features)
         features = checked_features(self, features[None] if features.ndim == 2 else features)
         if state is None:
             state = self.zero_state(len(features))._replace(frame=features[:, 0])

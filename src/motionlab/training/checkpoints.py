@@ -75,6 +75,7 @@ def save_weights(
     _save(path, tensors, header)
 
 
+@torch.inference_mode(False)  # loaded while sampling, it must serve when training
 def load_weights(path: str | os.PathLike) -> tuple[nn.Module, dict]:
     """The model that `save_weights` stored, in float32 on the CPU, and what was said about it.
 
