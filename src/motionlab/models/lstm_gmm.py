@@ -274,8 +274,9 @@ class LstmGmm(Recurrent):
         memory : ρ of the Gaussians' noise, from 0, the paper's white noise, to less than 1.
         precision : of the weights. "full" is theirs. "int8" draws faster, one character or
             hundreds: nearly the same distribution, another motion (it rounds what is multiplied,
-            too). "half" draws one or a few faster, and of weights that were stored in half
-            precision it loses nothing. Both only in ``torch.no_grad()``, on x86 processors.
+            too). "half" draws one or a few of a wide network faster, and of weights that were
+            stored in half precision it loses nothing. For one to four characters small layers stay
+            in full, which is faster. Both only in ``torch.no_grad()``, on x86 processors.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""`LstmGmm.generate` unrolled for speed, for when no gradient is asked for.
+"""`LstmGmm.generate` unrolled for speed, for when no gradient is asked for; a few characters in numpy.
 
 The same network and the same chance as the loop in lstm_gmm.py. What is different: nothing
 remembers how it was computed, features stay normalised from the first frame to the last, and each
@@ -14,23 +14,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
-from weakref import WeakKeyDictionary
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
 from ..errors import ModelError
 from .noise import noise_to_draw, normal
+from .sampler_few import Few, Linear, Product, gates_in_order, rounded, whole
 from .state import State
+from .unchanged import made_of
 
 if TYPE_CHECKING:
     from .lstm_gmm import LstmGmm
 
-_rounded: WeakKeyDictionary[LstmGmm, tuple[list, list]] = WeakKeyDictionary()
 BLOCK = 32  # numbers that a product of whole weights takes at a time
 FEW = 4  # characters for whom reading the weights takes longer than multiplying
-Linear = Callable[[Tensor], Tensor]  # (batch, in) -> (batch, out)
+FEW_IN_FULL = 16  # characters whom numpy serves faster than torch, with weights in full
+Memory = tuple[Tensor, Tensor, Tensor, Tensor]  # h, C, noise and seen after the last frame
 
 
 class Chance(NamedTuple):
@@ -67,33 +69,65 @@ def unroll(
             f'generate: precision "{precision}" needs a float32 model on an x86 processor. '
             "Leave it out."
         )
-    generator, temperature, component_temperature, disturbed, memory = chance
     with torch.autocast(start.frame.device.type, enabled=False):
-        *enter, leave = _products(model, precision)
-        seen, noise = _seen(model, start), start.noise  # (batch, kept)
-        hidden, cell = ([*part.unbind(1)] for part in (start.hidden, start.cell))
-        frames = seen.new_empty(len(seen), n, model.kept)
-        rows = torch.arange(len(seen), device=seen.device)
-        for t in range(n):
-            weights, gaussians = leave(hidden[-1]).tensor_split([model.components], 1)
-            chosen = choose(weights / component_temperature, generator)
-            gaussians = gaussians.view(len(seen), 2, model.components, model.kept)
-            mean, log_std = gaussians[rows, :, chosen].unbind(1)
-            std = temperature * (model.reach * log_std.exp() + model.floor)
-            noise = noise_to_draw(noise, std, memory, generator)
-            frames[:, t] = seen = model.reach * mean + model.skip * seen + std * noise
-            if t == n - 1 and not onward:
-                return model.normalizer.inverse(frames), start
-            if disturbed:
-                disturbance = disturbed * normal(
-                    start.frame, generator
-                )  # (batch, dim), as the loop's
-                seen = seen + disturbance[:, model.normalizer.kept]
+        most = FEW_IN_FULL if precision == "full" else FEW
+        few = len(start.frame) <= most and _known_to_numpy(start.hidden)
+        draw = _draw_few if few else _draw_many
+        products = _products(model, precision, few)
+        frames, memory = draw(model, products, n, start, chance, onward)
+        after = model.normalizer.inverse(memory[-1])
+    return model.normalizer.inverse(frames), State(after, *memory) if onward else start
+
+
+def _draw_many(
+    model: LstmGmm, products: list[Linear], n: int, start: State, chance: Chance, onward: bool
+) -> tuple[Tensor, Memory]:
+    """Frames (batch, n, kept), normalised."""
+    generator, temperature, component_temperature, _, memory = chance
+    *enter, leave = products
+    seen, noise = _seen(model, start), start.noise  # (batch, kept)
+    hidden, cell = ([*part.unbind(1)] for part in (start.hidden, start.cell))
+    frames = seen.new_empty(len(seen), n, model.kept)
+    rows = torch.arange(len(seen), device=seen.device)
+    for t in range(n):
+        weights, gaussians = leave(hidden[-1]).tensor_split([model.components], 1)
+        chosen = choose(weights / component_temperature, generator)
+        gaussians = gaussians.view(len(seen), 2, model.components, model.kept)
+        mean, log_std = gaussians[rows, :, chosen].unbind(1)
+        std = temperature * (model.reach * log_std.exp() + model.floor)
+        noise = noise_to_draw(noise, std, memory, generator)
+        frames[:, t] = seen = model.reach * mean + model.skip * seen + std * noise
+        if t < n - 1 or onward:
+            if chance.noise:
+                seen = seen + _disturbance(model, start, chance)
             _see(enter, seen, hidden, cell)
-        after = (torch.stack(part, 1) for part in (hidden, cell))
-        return model.normalizer.inverse(frames), State(
-            model.normalizer.inverse(seen), *after, noise, seen
-        )
+    return frames, (torch.stack(hidden, 1), torch.stack(cell, 1), noise, seen)
+
+
+def _draw_few(
+    model: LstmGmm, products: list[Product], n: int, start: State, chance: Chance, onward: bool
+) -> tuple[Tensor, Memory]:
+    """The same in numpy, who knows of no gradients."""
+    start = State(*(part.detach() for part in start))
+    seen = _seen(model, start)
+    few = Few(model, products, seen, start, chance)
+    frames = seen.new_empty(len(seen), n, model.kept)
+    rows = frames.numpy()
+    with np.errstate(all="ignore"):  # as torch: who leaves all bounds is told by the numbers
+        for t in range(n):
+            rows[:, t] = few.draw()
+            if t < n - 1 or onward:
+                few.see(_disturbance(model, start, chance).numpy() if chance.noise else None)
+    return frames, few.after()
+
+
+def _disturbance(model: LstmGmm, start: State, chance: Chance) -> Tensor:
+    """What is added to what the network sees (batch, kept): drawn for all of (batch, dim), as the loop's."""
+    return chance.noise * normal(start.frame, chance.generator)[:, model.normalizer.kept]
+
+
+def _known_to_numpy(tensor: Tensor) -> bool:
+    return tensor.device.type == "cpu" and tensor.dtype in (torch.float32, torch.float64)
 
 
 def _seen(model: LstmGmm, state: State) -> Tensor:
@@ -122,39 +156,43 @@ def _lstm(gates: Tensor, cell: Tensor) -> tuple[Tensor, Tensor]:
     """New h and C (batch, width) of a layer from its four gates side by side (batch, 4 width).
 
     One sigmoid does for all four, and takes a third of a tanh's time: tanh(x) = 2 sigmoid(2 x) - 1.
-    The third gate, which wants the tanh, comes doubled (`_made`).
+    The third gate, which wants the tanh, comes doubled (`_third_doubled`).
     """
     enter, keep, new, show = gates.sigmoid_().chunk(4, 1)
     cell = torch.addcmul(keep.mul_(cell), enter, new.mul_(2).sub_(1))
     return (2 * cell).sigmoid_().mul_(2).sub_(1).mul_(show), cell
 
 
-def _products(model: LstmGmm, precision: str) -> list[Linear]:
+def _products(model: LstmGmm, precision: str, few: bool) -> list[Linear] | list[Product]:
     """The network's five matrix products; those of the LSTM layers for all four gates at once.
 
-    Rounding takes as long as drawing some seconds of one character. So what was rounded is kept for
-    as long as the model lives and its weights do not change.
+    Rounding or turning weights takes as long as drawing some seconds of one character. So what was made
+    of them is kept for as long as the model lives and its weights do not change.
     """
-    if precision == "full":
-        return _made(model, _full)
-    if any(weight.is_inference() for weight in model.parameters()):
-        return _made(model, PRECISIONS[precision])  # made in inference mode: changes leave no trace
-    weights = [precision, *((weight.data_ptr(), weight._version) for weight in model.parameters())]
-    of_weights, products = _rounded.get(model, (None, []))
-    if of_weights != weights:
-        products = _made(model, PRECISIONS[precision])
-        _rounded[model] = weights, products
-    return products
+    make = PRECISIONS[precision]
+    if few:
+        make = whole if precision == "full" else rounded(make)
+        return made_of(model, f"{precision}, few", lambda: _made(model, make, gates_in_order))
+    made = lambda: _made(model, make, _third_doubled)
+    return made() if precision == "full" else made_of(model, precision, made)
 
 
-def _made(model: LstmGmm, linear: Callable[[Tensor, Tensor], Linear]) -> list[Linear]:
-    products = [linear(layer.weight, layer.bias) for layer in (model.enter[0], model.enter[2])]
+def _made(
+    model: LstmGmm,
+    product: Callable[[Tensor, Tensor], Linear | Product],
+    arranged: Callable[[Tensor], Tensor],
+) -> list[Linear] | list[Product]:
+    products = [product(layer.weight, layer.bias) for layer in (model.enter[0], model.enter[2])]
     for of_input, of_hidden, bias, bias_too in model.lstm.all_weights:
-        weight, bias = torch.cat([of_input, of_hidden], 1), bias + bias_too
-        for part in (weight, bias):
-            part[2 * model.width : 3 * model.width].mul_(2)  # see _lstm
-        products.append(linear(weight, bias))
-    return [*products, linear(model.leave.weight, model.leave.bias)]
+        weight = torch.cat([of_input, of_hidden], 1)
+        products.append(product(arranged(weight), arranged(bias + bias_too)))
+    return [*products, product(model.leave.weight, model.leave.bias)]
+
+
+def _third_doubled(rows: Tensor) -> Tensor:
+    """Rows of an LSTM's weights, or its biases, as `_lstm` wants them."""
+    enter, keep, new, show = rows.chunk(4)
+    return torch.cat([enter, keep, 2 * new, show])
 
 
 def _full(weight: Tensor, bias: Tensor) -> Linear:
@@ -211,9 +249,9 @@ def _int8_for_few(whole: Tensor, scale: Tensor, bias: Tensor) -> Linear:
     ones = torch.ones(len(whole), dtype=torch.bfloat16)  # scales; ours have more digits
 
     def product(inputs: Tensor) -> Tensor:
-        short = functional.pad(inputs, (0, beyond)).bfloat16()
-        sums = torch._weight_int8pack_mm(short, whole, ones)[:, :rows]
-        return torch.addcmul(bias, sums.float(), scale)
+        short = (functional.pad(inputs, (0, beyond)) if beyond else inputs).bfloat16()
+        sums = torch._weight_int8pack_mm(short, whole, ones)
+        return torch.addcmul(bias, sums if rows == len(whole) else sums[:, :rows], scale)
 
     return product
 

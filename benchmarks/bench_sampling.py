@@ -1,0 +1,117 @@
+"""Sampling: one character in Python beside ONNX Runtime's bare step, and 256 of them.
+
+    python benchmarks/bench_sampling.py [--width 256] [--rounds 9] [--threads 1] [--save]
+        [--against FOLDER]
+
+A frame of one character is drawn with all that belongs to it: network, mixture, decoding to raw
+features, and its share of what a call checks. ONNX Runtime's step is the network alone, its memory fed
+back, if `onnx` and `onnxruntime` are installed. FOLDER holds an older build of motionlab, which does
+the same in the same run. Seconds are those of processors for one character, of the clock for many.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import torch
+import tyro
+from interleaved import OtherBuild, answer, medians, save, table, verdict
+
+from motionlab import Skeleton
+from motionlab.encodings import JointAngles, Normalizer
+from motionlab.models import LstmGmm
+from motionlab.models.sampler import can_round
+
+FRAMES, CHARACTERS, OF_MANY = 200, 256, 20
+LIMITS = {
+    "one / the older build's best": 0.5,
+    "one / ONNX Runtime's bare step": 1.5,
+    "many / the older build": 1 / 1.5,
+}
+
+
+@dataclass
+class Options:
+    width: int = 256
+    many_width: int = 512
+    rounds: int = 9
+    threads: int = 1
+    save: bool = False
+    against: Path | None = None
+    answer: bool = False  # to the process that asks for jobs on the standard input
+
+
+@torch.no_grad()
+def main(options: Options) -> None:
+    torch.set_num_threads(options.threads)
+    one, many = one_character(options.width), many_characters(options.many_width)
+    clock = time.perf_counter if options.threads > 1 else time.process_time
+    if options.answer:
+        return answer({**one, **many}, clock)
+    jobs = {**one, **many}
+    if find_spec("onnxruntime") and find_spec("onnx"):
+        from onnx_step import bare_steps
+
+        jobs["ONNX Runtime's bare step"] = bare_steps(model_of(options.width), FRAMES)
+    if options.against:
+        told = [f"--{name}={getattr(options, name)}" for name in ("width", "threads")]
+        older = OtherBuild(options.against, [*told, f"--many-width={options.many_width}"])
+        jobs |= {f"older build: {name}": older.job(name) for name in (*one, *many)}
+    seconds = medians(jobs, options.rounds, clock)
+    if options.against:
+        older.close()
+    show(seconds, list(one), list(many), options)
+
+
+def show(seconds: dict[str, float], one: list[str], many: list[str], options: Options) -> None:
+    best = min(seconds[name] for name in one)
+    found = {}
+    if options.against:
+        older = lambda names: min(seconds[f"older build: {name}"] for name in names)
+        found["one / the older build's best"] = best / older(one)
+        found["many / the older build"] = min(seconds[name] for name in many) / older(many)
+    if "ONNX Runtime's bare step" in seconds:
+        found["one / ONNX Runtime's bare step"] = best / seconds["ONNX Runtime's bare step"]
+    frames = lambda name: OF_MANY * CHARACTERS if name.split(": ")[-1] in many else FRAMES
+    table(
+        f"a frame at width {options.width}, of many at {options.many_width}, "
+        f"threads: {options.threads}",
+        [(name, f"{1e6 * value / frames(name):.1f} µs", "") for name, value in seconds.items()]
+        + [(name, f"{value:.3f}", verdict(value, LIMITS[name])) for name, value in found.items()],
+    )
+    if options.save:
+        save("bench_sampling", {"threads": options.threads, "seconds": seconds, **found})
+
+
+def model_of(width: int) -> LstmGmm:
+    torch.manual_seed(0)
+    encoding = JointAngles(Skeleton.canonical(), contacts=True)
+    return LstmGmm(encoding, Normalizer(encoding.dim), width=width, skip=0.9)
+
+
+def one_character(width: int) -> dict[str, Callable]:
+    model = model_of(width)
+    start = model.zero_state()
+    kinds = ("full", "half", "int8") if can_round(start.hidden) else ("full",)
+    return {
+        f"one, {kind}": lambda kind=kind: model.generate(FRAMES, start, precision=kind)
+        for kind in kinds
+    }
+
+
+def many_characters(width: int) -> dict[str, Callable]:
+    model = model_of(width)
+    start = model.zero_state(CHARACTERS)
+    kinds = ("full", "int8") if can_round(start.hidden) else ("full",)
+    return {
+        f"many, {kind}": lambda kind=kind: model.generate(OF_MANY, start, precision=kind)
+        for kind in kinds
+    }
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options, description=__doc__))
