@@ -146,21 +146,18 @@ def _seen(model: LstmGmm, state: State) -> Tensor:
 def _see(enter: list[Linear], seen: Tensor, hidden: list[Tensor], cell: list[Tensor]) -> None:
     """A frame more (batch, kept): h and C of the layers become those after it."""
     first, second, *layers = enter
-    out = second(first(seen).relu_()).relu_()
+    out = second(first(seen))
     for i, gates in enumerate(layers):
         out, cell[i] = _lstm(gates(torch.cat([out, hidden[i]], 1)), cell[i])
         hidden[i] = out
 
 
 def _lstm(gates: Tensor, cell: Tensor) -> tuple[Tensor, Tensor]:
-    """New h and C (batch, width) of a layer from its four gates side by side (batch, 4 width).
-
-    One sigmoid does for all four, and takes a third of a tanh's time: tanh(x) = 2 sigmoid(2 x) - 1.
-    The third gate, which wants the tanh, comes doubled (`_third_doubled`).
-    """
-    enter, keep, new, show = gates.sigmoid_().chunk(4, 1)
-    cell = torch.addcmul(keep.mul_(cell), enter, new.mul_(2).sub_(1))
-    return (2 * cell).sigmoid_().mul_(2).sub_(1).mul_(show), cell
+    """New h and C (batch, width) of a layer from its `gates_in_order` (batch, 4 width), bent by tanh."""
+    width = cell.shape[1]
+    enter, keep, show = gates[:, : 3 * width].add_(1).chunk(3, 1)  # twice their sigmoids
+    cell = (keep * cell).add_(enter.mul_(gates[:, 3 * width :])).mul_(0.5)
+    return cell.tanh().mul_(show).mul_(0.5), cell
 
 
 def _products(model: LstmGmm, precision: str, few: bool) -> list[Linear] | list[Product]:
@@ -169,43 +166,36 @@ def _products(model: LstmGmm, precision: str, few: bool) -> list[Linear] | list[
     Rounding or turning weights takes as long as drawing some seconds of one character. So what was made
     of them is kept for as long as the model lives and its weights do not change.
     """
-    make = PRECISIONS[precision]
+    make, name = PRECISIONS[precision], precision
     if few:
-        make = whole if precision == "full" else rounded(make)
-        return made_of(model, f"{precision}, few", lambda: _made(model, make, gates_in_order))
-    made = lambda: _made(model, make, _third_doubled)
-    return made() if precision == "full" else made_of(model, precision, made)
+        make, name = whole if precision == "full" else rounded(make), f"{precision}, few"
+    return made_of(model, name, lambda: _made(model, make))
 
 
-def _made(
-    model: LstmGmm,
-    product: Callable[[Tensor, Tensor], Linear | Product],
-    arranged: Callable[[Tensor], Tensor],
-) -> list[Linear] | list[Product]:
-    products = [product(layer.weight, layer.bias) for layer in (model.enter[0], model.enter[2])]
+def _made(model: LstmGmm, make: Callable[..., Linear | Product]) -> list[Linear] | list[Product]:
+    products = [make(model.enter[i].weight, model.enter[i].bias, "relu") for i in (0, 2)]
     for of_input, of_hidden, bias, bias_too in model.lstm.all_weights:
-        weight = torch.cat([of_input, of_hidden], 1)
-        products.append(product(arranged(weight), arranged(bias + bias_too)))
-    return [*products, product(model.leave.weight, model.leave.bias)]
+        weight = gates_in_order(torch.cat([of_input, of_hidden], 1))
+        products.append(make(weight, gates_in_order(bias + bias_too), "tanh"))
+    return [*products, make(model.leave.weight, model.leave.bias)]
 
 
-def _third_doubled(rows: Tensor) -> Tensor:
-    """Rows of an LSTM's weights, or its biases, as `_lstm` wants them."""
-    enter, keep, new, show = rows.chunk(4)
-    return torch.cat([enter, keep, 2 * new, show])
+# what a product's sums go through; with "int8" within the product itself, where it costs nothing
+_BENT = {"none": lambda values: values, "relu": Tensor.relu_, "tanh": Tensor.tanh_}
 
 
-def _full(weight: Tensor, bias: Tensor) -> Linear:
-    return lambda inputs: functional.linear(inputs, weight, bias)
+def _full(weight: Tensor, bias: Tensor, bend: str = "none") -> Linear:
+    return lambda inputs: _BENT[bend](functional.linear(inputs, weight, bias))
 
 
-def _half(weight: Tensor, bias: Tensor) -> Linear:
+def _half(weight: Tensor, bias: Tensor, bend: str = "none") -> Linear:
     """Weights in half precision, which is half the memory to go through; sums in float32."""
     packed = torch.ops.quantized.linear_prepack_fp16(weight, bias)
-    return lambda inputs: torch.ops.quantized.linear_dynamic_fp16(inputs, packed)
+    product = torch.ops.quantized.linear_dynamic_fp16
+    return lambda inputs: _BENT[bend](product(inputs, packed))
 
 
-def _int8(weight: Tensor, bias: Tensor) -> Linear:
+def _int8(weight: Tensor, bias: Tensor, bend: str = "none") -> Linear:
     """Whole numbers: each row of weights in 255 steps, the inputs in 128.
 
     Not 256: older processors add products in pairs, in 16 bits, and 2 * 127 * 127 is what fits.
@@ -220,7 +210,7 @@ def _int8(weight: Tensor, bias: Tensor) -> Linear:
 
     def product(inputs: Tensor) -> Tensor:
         if len(inputs) <= FEW:
-            return for_few(inputs)
+            return _BENT[bend](for_few(inputs))
         low, high = (edge.item() for edge in inputs.aminmax())
         if not math.isfinite(high - low):
             raise ModelError(
@@ -230,9 +220,10 @@ def _int8(weight: Tensor, bias: Tensor) -> Linear:
         step = max(high - low, 1e-6) / 127
         zero = round(-low / step)
         half = inputs.new_tensor(zero + 0.5)  # conversion cuts off what is behind the point
-        steps = torch.add(half, inputs, alpha=1 / step).to(torch.uint8)
+        # as int8, which holds them as well, and to which torch converts in a quarter of the time
+        steps = torch.add(half, inputs, alpha=1 / step).to(torch.int8).view(torch.uint8)
         return torch.ops.onednn.qlinear_pointwise(
-            steps, step, zero, packed, scale, zeros, bias, 1.0, 0, torch.float32, "none", [], ""
+            steps, step, zero, packed, scale, zeros, bias, 1.0, 0, torch.float32, bend, [], ""
         )
 
     return product

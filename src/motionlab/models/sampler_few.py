@@ -25,26 +25,34 @@ SMALL = 200_000  # weights; fewer are read in less time than torch takes to roun
 _HALF = np.array([0.5], np.float32)  # as an array: of a number numpy asks each time what it is
 
 
-def whole(weight: Tensor, bias: Tensor) -> Product:
+_BENT = {
+    "none": lambda values: values,
+    "relu": lambda values: np.maximum(values, 0, out=values),
+    "tanh": lambda values: np.tanh(values, out=values),
+}
+
+
+def whole(weight: Tensor, bias: Tensor, bend: str = "none") -> Product:
     """A product with weights in full; they lie in memory as it reads them."""
     across, bias = weight.detach().T.contiguous().numpy(), bias.detach().numpy()
-    return lambda inputs: inputs @ across + bias
+    bent = _BENT[bend]
+    return lambda inputs: bent(inputs @ across + bias)
 
 
-def rounded(make: Callable[[Tensor, Tensor], Linear]) -> Callable[[Tensor, Tensor], Product]:
+def rounded(make: Callable[..., Linear]) -> Callable[..., Product]:
     """Products as `make` makes them for tensors; small ones stay in full, which is faster."""
 
-    def made(weight: Tensor, bias: Tensor) -> Product:
+    def made(weight: Tensor, bias: Tensor, bend: str = "none") -> Product:
         if weight.numel() < SMALL:
-            return whole(weight, bias)
-        linear = make(weight, bias)
-        return lambda inputs: linear(torch.from_numpy(inputs)).numpy()
+            return whole(weight, bias, bend)
+        linear, bent = make(weight, bias), _BENT[bend]
+        return lambda inputs: bent(linear(torch.from_numpy(inputs)).numpy())
 
     return made
 
 
 def gates_in_order(rows: Tensor) -> Tensor:
-    """Rows of an LSTM's weights, or its biases, as `_lstm` wants them.
+    """Rows of an LSTM's weights, or its biases, as both samplers want them.
 
     torch's order is enter, keep, new, show. The three that are squashed by a sigmoid come first, halved:
     sigmoid(x) = (1 + tanh(x / 2)) / 2, and so one tanh does for all four.
@@ -79,7 +87,7 @@ class Few:
             [*part.numpy().swapaxes(0, 1)] for part in (before.hidden, before.cell)
         )
         number = lambda value: np.array([value], self.seen.dtype)
-        self.reach, self.skip, self.zero = number(model.reach), number(model.skip), number(0)
+        self.reach, self.skip = number(model.reach), number(model.skip)
         self.spread = number(chance.temperature * model.reach)
         self.floor = chance.temperature * model.floor.numpy()
         self.share = number(chance.memory), number((1 - chance.memory**2) ** 0.5)
@@ -119,7 +127,7 @@ class Few:
         if disturbance is not None:
             self.seen = self.seen + disturbance
         first, second, *layers = self.enter
-        out = np.maximum(second(np.maximum(first(self.seen), self.zero)), self.zero)
+        out = second(first(self.seen))
         for i, gates in enumerate(layers):
             read = np.concatenate((out, self.hidden[i]), 1)
             out, self.cell[i] = _lstm(gates(read), self.cell[i])
@@ -132,9 +140,8 @@ class Few:
 
 
 def _lstm(gates: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """New h and C (batch, width) of a layer from its `gates_in_order` (batch, 4 width), which it uses up."""
+    """New h and C (batch, width) of a layer from its `gates_in_order` (batch, 4 width), bent by tanh."""
     width = cell.shape[1]
-    np.tanh(gates, out=gates)
     squashed, new = gates[:, : 3 * width], gates[:, 3 * width :]
     squashed *= _HALF
     squashed += _HALF
