@@ -216,6 +216,17 @@ def test_single_frames_come_back_so_many_frames_later():
     assert len(stream.finish()[0]) == AHEAD
 
 
+def test_a_frame_may_be_written_over_once_it_is_pushed():
+    motion, down = sliding(seconds=1)
+    stream, done = LockStream(motion.skeleton, motion.fps), []
+    place, turns = torch.empty(3), torch.empty_like(motion.rotations[0])
+    for t in range(len(motion)):
+        place.copy_(motion.root_positions[t])
+        turns.copy_(motion.rotations[t])
+        done.append(stream.push(place, turns, down[t])[1])
+    assert torch.equal(torch.cat([*done, stream.finish()[1]]), streamed(motion, down).rotations)
+
+
 def test_what_was_given_back_does_not_change_with_what_comes():
     """Frames are final: another future is another future."""
     motion, down = sliding(seconds=2)

@@ -68,7 +68,7 @@ class LockStream:
     ahead : frames that are known ahead; None: a sixth of a second, 5 at 30 frames a second.
     example : a motion of this skeleton. Needed only if its rest pose does not stand on the floor, so
         that only motion tells which way knees point and how high toes are.
-    state : of a stream that went before, to go on from.
+    state : of a stream that went before, to go on from; it changes as the stream does.
 
     Raises
     ------
@@ -168,7 +168,8 @@ class LockStream:
     # -- one frame ----------------------------------------------------------------------------
 
     def _take(self, root: np.ndarray, rotations: np.ndarray, down: list[bool]) -> None:
-        """Put a frame into the queue."""
+        """Put a frame into the queue; a copy, as its owner may write the next one over it."""
+        root, rotations = root.copy(), rotations.copy()
         points, world = self._kinematics(root, rotations)
         at = points[self._points].tolist()
         fronts = (world[self._points[0]] @ self._front)[..., 0].tolist()
@@ -195,10 +196,9 @@ class LockStream:
         shifts = [self._shifts(i) for i in range(2)]
         down = self._sink(shifts)
         frame = self.state.waiting.pop(0)
-        root, rotations = frame.root.copy(), frame.rotations.copy()
-        root[1] -= down
-        self._bend(rotations, frame, [shifts[0][0], shifts[1][0]], down)
-        return root, rotations
+        frame.root[1] -= down
+        self._bend(frame, [shifts[0][0], shifts[1][0]], down)
+        return frame.root, frame.rotations
 
     def _shifts(self, i: int) -> list[Vector]:
         """How far one foot is to be moved, in this frame and, as it looks, in the next ones."""
@@ -244,10 +244,8 @@ class LockStream:
         )
         return max(eased, *(ahead[0][i] for i in sides if feet[i].place is not None), 0.0)
 
-    def _bend(
-        self, rotations: np.ndarray, frame: _Frame, shifts: list[Vector], down: float
-    ) -> None:
-        """Turn the legs of a frame's local rotations so that they reach their ankles."""
+    def _bend(self, frame: _Frame, shifts: list[Vector], down: float) -> None:
+        """Turn the legs of a frame so that they reach their ankles."""
         lifts: list = [None, None]
         if self.floor is not None and self._toed:
             heights = [frame.at[3][i][1] + shifts[i][1] - self.floor for i in range(2)]
@@ -267,7 +265,7 @@ class LockStream:
         # each joint in the frame of the one above, which has turned as well
         turned[1:] = turned[:3].swapaxes(-1, -2) @ turned[1:]
         above, own = frame.world[self._above], frame.world[self._points[: len(self._above)]]
-        rotations[self._places] = above.swapaxes(-1, -2) @ turned[: len(above)] @ own
+        frame.rotations[self._places] = above.swapaxes(-1, -2) @ turned[: len(above)] @ own
 
 
 # -- what is known beforehand -----------------------------------------------------------------------
