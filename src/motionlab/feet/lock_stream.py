@@ -23,7 +23,7 @@ from .contacts import label, stands_on_floor
 from .holding import Foot, Rules
 from .legs import PARTS, flat_toes, front_at_rest, knee_front, leg_joints, legs_alone
 from .lock import BLEND, SETTLE
-from .one_leg import Vector, knee, needed, plus, toes_up, turn
+from .one_leg import Matrix, Vector, knee, needed, plus, toes_up, turn
 
 
 @dataclass
@@ -51,7 +51,8 @@ class LockState:
     frames: int = 0  # that came in
 
 
-_STAYS = np.eye(3)
+_STAYS = np.eye(3).tolist()
+_STILL = np.array([[_STAYS] * 2] * 4)  # thighs, shanks, feet and toes that do not turn
 
 
 class LockStream:
@@ -252,20 +253,30 @@ class LockStream:
             lifts = [toes_up(*both) for both in zip(frame.tips, heights, strict=True)]
         if not down and not any(any(shift) for shift in shifts) and lifts == [None, None]:
             return
-        turned = _STAYS[None, None].repeat(4, 0).repeat(2, 1)  # feet keep the way they point
-        for i, (hip, knee_was, ankle, _) in enumerate(zip(*frame.at, strict=True)):
-            if down or any(shifts[i]):
-                thigh, shin = plus(knee_was, -1, hip), plus(ankle, -1, knee_was)
-                reach = plus(plus(ankle, 1, shifts[i]), -1, hip)
-                reach[1] += down
-                there = knee(thigh, shin, reach, frame.fronts[i])
-                turned[0, i], turned[1, i] = turn(thigh, there), turn(shin, plus(reach, -1, there))
-            if lifts[i] is not None:
-                turned[3, i] = lifts[i]
+        turned = _STILL.copy()  # feet keep the way they point
+        if down or any(any(shift) for shift in shifts):
+            turned[:2] = list(
+                zip(*(self._turns(frame, i, shifts[i], down) for i in range(2)), strict=True)
+            )
+        for i, lift in enumerate(lifts):
+            if lift is not None:
+                turned[3, i] = lift
         # each joint in the frame of the one above, which has turned as well
         turned[1:] = turned[:3].swapaxes(-1, -2) @ turned[1:]
         above, own = frame.world[self._above], frame.world[self._points[: len(self._above)]]
         frame.rotations[self._places] = above.swapaxes(-1, -2) @ turned[: len(above)] @ own
+
+    @staticmethod
+    def _turns(frame: _Frame, i: int, shift: Vector, down: float) -> tuple[Matrix, Matrix]:
+        """Turns of one leg's thigh and shank, in the world."""
+        hip, knee_was, ankle, _ = (part[i] for part in frame.at)
+        if not down and not any(shift):
+            return _STAYS, _STAYS
+        thigh, shin = plus(knee_was, -1, hip), plus(ankle, -1, knee_was)
+        reach = plus(plus(ankle, 1, shift), -1, hip)
+        reach[1] += down
+        there = knee(thigh, shin, reach, frame.fronts[i])
+        return turn(thigh, there), turn(shin, plus(reach, -1, there))
 
 
 # -- what is known beforehand -----------------------------------------------------------------------

@@ -14,6 +14,7 @@ from .lock import BACKWARDS, NEAR, REACH, STRAIGHT
 from .planting import TIP
 
 Vector = Sequence[float]
+Matrix = Sequence[Vector]
 _LEAST = 1e-12
 
 
