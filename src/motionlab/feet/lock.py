@@ -25,6 +25,7 @@ from .planting import off_the_floor, steps
 GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
 FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, whatever its label
 FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
+DEEPEST = 0.05  # metres that the body may come down for a foot; one that asks for more is let go
 RESTS = 0.005  # m/s; a toe that is slower is still, and slides nowhere
 BLEND = 0.25  # seconds from a foot's own way to where it is held
 REACH = 0.97  # share of its length to which a leg may be stretched; near 1 knees snap
@@ -107,7 +108,11 @@ def lock(
     flat = flat_toes(legs, points, held)
     ground = _ground(toes, held, flat, floor)
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
-        held = held & (length(_onto_places(toes, held, ground)) < FARTHEST)
+        onto = _onto_places(toes, held, ground)
+        ankle = at["foot"] + onto
+        ankle[..., 1] -= _usual(onto[..., 1], held)  # what a lower floor asks of all contacts alike
+        deep = _needed(at, ankle) > DEEPEST
+        held = held & (length(onto) < FARTHEST) & ~deep
     shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
     shift = _above(shift, at, ground, ground - flat)
     ankle = at["foot"] + shift
@@ -178,8 +183,13 @@ def _ground(toes: Tensor, held: Tensor, flat: Tensor, floor: float | None) -> Te
     """Heights (..., 2) of resting toe joints: the plane of contact."""
     if floor is not None:
         return (flat + floor).expand(*toes.shape[:-3], 2)
-    heights = torch.where(held, toes[..., 1], torch.nan)
-    return torch.nan_to_num(heights.nanmedian(-2).values, nan=0.0)
+    return _usual(toes[..., 1], held)[..., 0, :]
+
+
+def _usual(values: Tensor, held: Tensor) -> Tensor:
+    """Median (..., 1, 2) of values (..., frames, 2) while feet are held; 0 if they never are."""
+    median = torch.where(held, values, torch.nan).nanmedian(-2, keepdim=True).values
+    return torch.nan_to_num(median, nan=0.0)
 
 
 def _onto_places(toes: Tensor, held: Tensor, ground: Tensor) -> Tensor:
@@ -227,6 +237,12 @@ def _above(shift: Tensor, at: dict[str, Tensor], ground: Tensor, floor: Tensor) 
 
 def _sink(at: dict[str, Tensor], ankle: Tensor, fps: float) -> Tensor:
     """How far the root comes down (..., frames, 3) for both legs to reach their ankles."""
+    down = _smoothed_over(_needed(at, ankle).amax(-1), SETTLE * fps)
+    return torch.stack([torch.zeros_like(down), down, torch.zeros_like(down)], dim=-1)
+
+
+def _needed(at: dict[str, Tensor], ankle: Tensor) -> Tensor:
+    """How far a hip has to come down (..., frames, 2) for its leg to reach its ankle."""
     hip, knee, foot = (at[part] for part in PARTS[:3])
     longest = length(knee - hip) + length(foot - knee)
     stays = length(foot - hip).minimum(longest) - (length(ankle - foot) - NEAR).clamp(min=0)
@@ -234,9 +250,7 @@ def _sink(at: dict[str, Tensor], ankle: Tensor, fps: float) -> Tensor:
     way = hip - ankle
     level = way[..., [0, 2]].square().sum(-1)
     needed = way[..., 1] - (reach.square() - level).clamp(min=1e-4).sqrt()
-    needed = torch.where(needed > 1e-4, needed, 0).amax(-1)  # (..., frames)
-    down = _smoothed_over(needed, SETTLE * fps)
-    return torch.stack([torch.zeros_like(down), down, torch.zeros_like(down)], dim=-1)
+    return torch.where(needed > 1e-4, needed, 0)
 
 
 def _smoothed_over(values: Tensor, sigma: float) -> Tensor:
