@@ -152,7 +152,7 @@ def main(options: Options) -> None:
         + [(name, words[name], notes.get(name, "")) for name in found],
     )
     if options.save:
-        save("bench_design", {"seconds": seconds, **found})
+        save("bench_design", {"limits": LIMITS, "seconds": seconds, **found})
 
 
 def _holds(holds: bool) -> str:

@@ -2,13 +2,13 @@
 
     python benchmarks/bench_foot_lock.py [--clips 32] [--rounds 5] [--threads 1] [--save]
 
-The motion is the shipped network's with contacts, so feet slide. With it: how far a stream lies from
-the offline lock, and how much feet slide, on what the shipped refiner makes of that motion.
+The motion is the shipped network's with contacts, so feet slide. Seconds are those of processors.
+With it: how far a stream lies from the offline lock, and how much feet slide, on what the shipped
+refiner makes of that motion.
 """
 
 from __future__ import annotations
 
-import statistics
 import time
 from dataclasses import dataclass, replace
 
@@ -70,13 +70,10 @@ def main(options: Options) -> None:
     down = encoding.contacts(features) > 0.5
     locked = lambda i: lock(encoding.skeleton, place[i], turns[i], down[i], fps)
 
-    spent = []  # processor seconds, as a busy machine lets a stream wait
-
     def stream() -> None:
-        locking, begin = LockStream(encoding.skeleton, fps), time.process_time()
+        locking = LockStream(encoding.skeleton, fps)
         for frame in zip(place[0], turns[0], down[0], strict=True):
             locking.push(*frame)
-        spent.append(time.process_time() - begin)
 
     seconds = medians(
         {
@@ -86,11 +83,12 @@ def main(options: Options) -> None:
             "one, frame by frame": stream,
         },
         options.rounds,
+        time.process_time,
     )
     found = {
         "one clip (s)": seconds["one"],
         "batch / loop": seconds["batch"] / seconds["loop"],
-        "a stream / its length": statistics.median(spent) / SECONDS,
+        "a stream / its length": seconds["one, frame by frame"] / SECONDS,
     }
     table(
         f"{options.clips} clips of {SECONDS} s, {options.threads} threads",
@@ -101,7 +99,7 @@ def main(options: Options) -> None:
     apart = differences([encoding.to_motion(one) for one in refined])
     table("streamed and offline", [(name, f"{value:.1f}", "") for name, value in apart.items()])
     if options.save:
-        save("bench_foot_lock", {"seconds": seconds, **found, **apart})
+        save("bench_foot_lock", {"limits": LIMITS, "seconds": seconds, **found, **apart})
 
 
 if __name__ == "__main__":

@@ -8,15 +8,13 @@ window the difference from all real windows in numpy, its norm, its mean, its le
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 import tyro
-from interleaved import medians, save, table, verdict
+from interleaved import medians, peak, save, table, verdict
 from numpy.lib.stride_tricks import sliding_window_view
 
 from motionlab.metrics import nearest_window_distance
@@ -37,10 +35,10 @@ def main(options: Options) -> None:
     random = torch.Generator().manual_seed(0)
     frames = LENGTH + STRIDE * (WINDOWS - 1)
     samples, real = (torch.randn(1, frames, DIM, generator=random) for _ in range(2))
-    before = _peak()
+    before = peak()
     start = time.perf_counter()
     found = nearest_window_distance(samples, real, fps=30)
-    seconds, memory = time.perf_counter() - start, _peak() - before
+    seconds, memory = time.perf_counter() - start, peak() - before
     few = samples[:, : LENGTH + STRIDE * (SAMPLE - 1)]
     many = samples[:, : LENGTH + STRIDE * (25 * SAMPLE - 1)]
     rival = one_at_a_time(few[0].numpy(), real[0].numpy())
@@ -83,12 +81,6 @@ def one_at_a_time(samples: np.ndarray, real: np.ndarray) -> np.ndarray:
 
 def _names(options: Options) -> dict:
     return {"threads": options.threads, "windows": WINDOWS, "length": LENGTH, "dim": DIM}
-
-
-def _peak() -> int:
-    """Greatest memory of this process so far, in bytes."""
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return most if sys.platform == "darwin" else most * 1024
 
 
 if __name__ == "__main__":

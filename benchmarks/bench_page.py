@@ -65,7 +65,7 @@ def main(options: Options) -> None:
         else:
             print("No Chromium on the PATH, and none named by CHROMIUM: not measured there.")
     if options.save:
-        save("bench_page", {"limits": LIMITS, **numbers})
+        save("bench_page", {"limits": {**LIMITS, "refined ms": REFINED, "apart": APART}, **numbers})
 
 
 def report(where: str, found: dict) -> None:

@@ -6,7 +6,7 @@
 One character, as a stream of single frames and in one piece; many characters in one piece, beside
 the generator that makes them (`lstm-gmm`, as fast as it goes at this number). The stream is also
 refined as torch does it, and by an older build of motionlab, if FOLDER holds one. Seconds are those
-of processors.
+of processors. With it: how far the stream's points lie from torch's, at most.
 """
 
 from __future__ import annotations
@@ -44,12 +44,17 @@ def main(options: Options) -> None:
     if options.against:
         older = OtherBuild(options.against, ["--threads", str(options.threads)])
         jobs["one, by the older build"] = older.job("one, frame by frame")
+    points = motionlab.load("refiner").encoding.positions
+    fast, plain = (
+        points(torch.cat(jobs[f"one, frame by frame{how}"](), 1)) for how in ("", " in torch")
+    )
     seconds = medians(jobs, options.rounds, time.process_time)
     found = {
         "a stream / its length": seconds["one, frame by frame"] / SECONDS,
         "in torch / its length": seconds["one, frame by frame in torch"] / SECONDS,
         "in one piece / its length": seconds["one, in one piece"] / SECONDS,
         "refining / generating many": seconds["many refined"] / seconds["many generated"],
+        "apart (mm)": 1000 * float((fast - plain).norm(dim=-1).max()),
     }
     if options.against:
         older.close()
@@ -60,13 +65,13 @@ def main(options: Options) -> None:
         f"{SECONDS} s of one, {FRAMES} frames of {options.characters}, {options.threads} threads",
         [(name, f"{1000 * value:.1f} ms", "") for name, value in seconds.items()]
         + [
-            (name, f"{value:.4f}", verdict(value, LIMITS[name]) if name in LIMITS else "")
+            (name, f"{value:.4g}", verdict(value, LIMITS[name]) if name in LIMITS else "")
             for name, value in found.items()
         ]
         + [("a stream, times real time", f"{1 / found['a stream / its length']:.0f}", "")],
     )
     if options.save:
-        save("bench_refiner", {"seconds": seconds, **found})
+        save("bench_refiner", {"limits": LIMITS, "seconds": seconds, **found})
 
 
 def made(characters: int) -> dict:
@@ -81,14 +86,16 @@ def made(characters: int) -> dict:
     )
     many = generate()
 
-    def stream() -> None:
-        state = None
+    def stream() -> list[torch.Tensor]:
+        state, refined = None, []
         for frame in one.split(1, dim=1):
-            _, state = refiner.refine(frame, state)
+            now, state = refiner.refine(frame, state)
+            refined.append(now)
+        return refined
 
-    def in_torch() -> None:
+    def in_torch() -> list[torch.Tensor]:
         with torch.enable_grad():  # nothing asks for a gradient, but numpy knows of none
-            stream()
+            return stream()
 
     return {
         "one, frame by frame": stream,

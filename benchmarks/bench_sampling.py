@@ -6,7 +6,10 @@
 A frame of one character is drawn with all that belongs to it: network, mixture, decoding to raw
 features, and its share of what a call checks. ONNX Runtime's step is the network alone, its memory fed
 back, if `onnx` and `onnxruntime` are installed. FOLDER holds an older build of motionlab, which does
-the same in the same run. Seconds are those of processors for one character, of the clock for many.
+the same in the same run. Seconds are those of processors, of the clock if there are more threads.
+
+With it: how far the fast way lies from the plain loop after 10 s from one seed, and what rounding
+to "int8" changes in 100 motions of the shipped `lstm-gmm-contacts`, drawn one by one.
 """
 
 from __future__ import annotations
@@ -21,12 +24,14 @@ import torch
 import tyro
 from interleaved import OtherBuild, answer, medians, save, table, verdict
 
-from motionlab import Skeleton
+import motionlab
+from motionlab import Skeleton, metrics
 from motionlab.encodings import JointAngles, Normalizer
 from motionlab.models import LstmGmm
 from motionlab.models.sampler import can_round
 
 FRAMES, CHARACTERS, OF_MANY = 200, 256, 20
+SECONDS, SAMPLES = 10, 100  # what differences are measured on
 LIMITS = {
     "one / the older build's best": 0.5,
     "one / ONNX Runtime's bare step": 1.5,
@@ -64,10 +69,16 @@ def main(options: Options) -> None:
     seconds = medians(jobs, options.rounds, clock)
     if options.against:
         older.close()
-    show(seconds, list(one), list(many), options)
+    show(seconds, list(one), list(many), differences("one, int8" in one), options)
 
 
-def show(seconds: dict[str, float], one: list[str], many: list[str], options: Options) -> None:
+def show(
+    seconds: dict[str, float],
+    one: list[str],
+    many: list[str],
+    apart: dict[str, float],
+    options: Options,
+) -> None:
     best = min(seconds[name] for name in one)
     found = {}
     if options.against:
@@ -83,8 +94,20 @@ def show(seconds: dict[str, float], one: list[str], many: list[str], options: Op
         [(name, f"{1e6 * value / frames(name):.1f} µs", "") for name, value in seconds.items()]
         + [(name, f"{value:.3f}", verdict(value, LIMITS[name])) for name, value in found.items()],
     )
+    table("what it changes", [(name, f"{value:.4g}", "") for name, value in apart.items()])
     if options.save:
-        save("bench_sampling", {"threads": options.threads, "seconds": seconds, **found})
+        save(
+            "bench_sampling",
+            {
+                "threads": options.threads,
+                "width": options.width,
+                "width of many": options.many_width,
+                "limits": LIMITS,
+                "seconds": seconds,
+                **found,
+                **apart,
+            },
+        )
 
 
 def model_of(width: int) -> LstmGmm:
@@ -111,6 +134,48 @@ def many_characters(width: int) -> dict[str, Callable]:
         f"many, {kind}": lambda kind=kind: model.generate(OF_MANY, start, precision=kind)
         for kind in kinds
     }
+
+
+# -- what it changes ------------------------------------------------------------------------------
+
+
+def differences(rounds: bool) -> dict[str, float]:
+    """Numpy against the plain loop, in mm; "int8", if there is any, against "full", as shares."""
+    model = motionlab.load("lstm-gmm-contacts")
+    fast = ends(model, "full")
+    with torch.enable_grad():  # nothing asks for a gradient, but numpy knows of none
+        apart = {"apart after 10 s (mm)": 1000 * float((fast - ends(model, "full")).norm())}
+    if rounds:
+        whole, rounded = (means(model, kind) for kind in ("full", "int8"))
+        apart |= {f"int8 / full: {name}": rounded[name] / whole[name] for name in whole}
+    return apart
+
+
+def drawn(model: LstmGmm, seed: int, precision: str) -> torch.Tensor:
+    """Features of one motion (frames, dim)."""
+    start, chance = model.starts[seed % len(model.starts.frame)], torch.Generator()
+    return model.generate(
+        round(SECONDS * model.fps), start, generator=chance.manual_seed(seed),
+        precision=precision, **model.sampling,
+    )[0].detach()  # fmt: skip
+
+
+def ends(model: LstmGmm, precision: str) -> torch.Tensor:
+    """Where the root ends (3)."""
+    return model.encoding.to_motion(drawn(model, 0, precision)).root_positions[-1]
+
+
+def means(model: LstmGmm, precision: str) -> dict[str, float]:
+    """Speed, acceleration and sliding of feet, over all samples."""
+    rows = []
+    for seed in range(SAMPLES):
+        motion = model.encoding.to_motion(drawn(model, seed, precision))
+        points, fps = motion.positions(), motion.fps
+        toes = motion.contacts[:, [1, 3]]
+        skate = metrics.foot_skate(points, toes, motion.skeleton, fps)
+        rows.append([metrics.speed(points, fps).mean(), metrics.acceleration(points, fps), skate])
+    found = torch.tensor(rows).nanmean(0).tolist()
+    return dict(zip(("speed", "acceleration", "slide of toes"), found, strict=True))
 
 
 if __name__ == "__main__":

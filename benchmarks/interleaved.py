@@ -85,8 +85,59 @@ def verdict(ratio: float, limit: float) -> str:
 
 
 def save(name: str, numbers: dict) -> None:
-    """Write numbers to results/NAME.json."""
+    """Write numbers to results/NAME.json, with the machine, the day and the command that made them.
+
+    load : how many programs wanted a processor in the last minute, this one among them.
+    """
     RESULTS.mkdir(exist_ok=True)
-    record = {"python": platform.python_version(), "machine": platform.machine(), **numbers}
+    record = {
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "processor": processor(),
+        "cores": os.cpu_count(),
+        "date": time.strftime("%Y-%m-%d"),
+        "command": command(sys.argv),
+        **(
+            {"load": round(os.getloadavg()[0], 1), "peak memory (MB)": round(peak() / 1e6)}
+            if os.name == "posix"
+            else {}
+        ),
+        **numbers,
+    }
     path = RESULTS / f"{name}.json"
     path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def peak() -> int:
+    """Greatest memory of this process so far, in bytes: Python, torch and all jobs that it did."""
+    import resource  # which Windows does not have
+
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else most * 1024
+
+
+def processor() -> str:
+    """What the processor calls itself; empty if it does not say."""
+    told = Path("/proc/cpuinfo")  # elsewhere than on Linux Python knows it
+    lines = told.read_text(encoding="utf-8").splitlines() if told.is_file() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def command(arguments: list[str]) -> str:
+    """How a script was called. A folder with another build is called by its commit: where it lay on
+    somebody's machine tells nobody anything."""
+    words = [f"benchmarks/{Path(arguments[0]).name}"]
+    for argument in arguments[1:]:
+        option, equals, value = argument.rpartition("=")
+        words.append(f"{option}{equals}{commit(value) if Path(value).is_dir() else value}")
+    return " ".join(["python", *words])
+
+
+def commit(tree: Path | str) -> str:
+    """The commit of a worktree, abbreviated; "unknown" if it is none."""
+    asked = subprocess.run(
+        ["git", "-C", str(tree), "rev-parse", "--short=7", "HEAD"],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    return asked.stdout.strip() or "unknown"
