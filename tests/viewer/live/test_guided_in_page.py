@@ -182,7 +182,7 @@ def walks(tmp_path_factory):
         record["error (cm)"]["rms"]
         for _, record in design_all(
             [Path.through(LINES["wave"])] * len(seeds), 1.2, None, as_in_browser(model),
-            method="none", candidates=1,
+            method="none", guide=True, candidates=1,
         )
     ]  # fmt: skip
     return page, sampled
