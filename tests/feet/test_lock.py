@@ -17,7 +17,7 @@ from motionlab.datasets import gaits
 from motionlab.errors import ModelError
 from motionlab.feet.contacts import foot_points
 from motionlab.feet.legs import PARTS, leg_joints
-from motionlab.feet.lock import DEEPEST, STRAIGHT, _clean, lock
+from motionlab.feet.lock import STRAIGHT, _clean, lock
 from motionlab.metrics import foot_skate
 from motionlab.roles import SIDES
 from motionlab.solvers import lock_feet
@@ -87,9 +87,14 @@ def test_a_body_that_rises_is_not_pulled_down_by_feet_that_are_said_to_stand():
     up = 0.1 * torch.sin(torch.pi * torch.arange(len(stand)) / stand.fps)
     root = stand.root_positions + up[:, None] * torch.tensor([0.0, 1.0, 0.0])
     down = torch.ones(len(stand), 2, dtype=torch.bool)
-    locked = lock_feet(replace(stand, root_positions=root), down)
-    sunk = root[:, 1] - locked.root_positions[:, 1]
-    assert sunk.max() < DEEPEST + 0.02  # some for easing in and out, and for a smooth way
+    risen = replace(stand, root_positions=root)
+    free, kept = (
+        (root - lock_feet(risen, down, **how).root_positions)[:, 1].max()
+        for how in ({}, {"deepest": 0.05})
+    )
+    assert free > 0.1 and kept < 0.07  # some for easing in and out, and for a smooth way
+    with pytest.raises(ModelError, match="deepest"):
+        lock_feet(risen, down, deepest=float("nan"))
 
 
 def test_feet_keep_the_way_they_point_and_bones_their_length():

@@ -25,7 +25,6 @@ from .planting import off_the_floor, steps
 GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
 FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, whatever its label
 FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
-DEEPEST = 0.05  # metres that the body may come down for a foot; one that asks for more is let go
 RESTS = 0.005  # m/s; a toe that is slower is still, and slides nowhere
 BLEND = 0.25  # seconds from a foot's own way to where it is held
 REACH = 0.97  # share of its length to which a leg may be stretched; near 1 knees snap
@@ -41,6 +40,7 @@ def lock_feet(
     *,
     floor: float | None = 0.0,
     blend: float = BLEND,
+    deepest: float = math.inf,
 ) -> Motion:
     """The motion with its toes held still while they are in contact.
 
@@ -52,6 +52,8 @@ def lock_feet(
         the first to the last frame in which it is.
     floor : height of the floor in metres. None: where toes lie while they are in contact.
     blend : seconds over which a foot eases into a contact, and out of it.
+    deepest : metres that the body may come down for a foot to reach its place; one that asks for more is
+        let go. It may be a little more where the body eases down.
 
     Returns
     -------
@@ -60,7 +62,7 @@ def lock_feet(
 
     Raises
     ------
-    ModelError : contacts of another shape or kind, or none, a blend or floor that is no number.
+    ModelError : contacts of another shape or kind, or none, a blend, floor or depth that is none.
     SkeletonError : the skeleton lacks a joint of a leg, or its legs do not hang together.
     """
     contacts = motion.contacts if contacts is None else contacts
@@ -70,7 +72,7 @@ def lock_feet(
         )
     place, rotations = lock(
         motion.skeleton, motion.root_positions, motion.rotations, contacts, motion.fps,
-        floor=floor, blend=blend,
+        floor=floor, blend=blend, deepest=deepest,
     )  # fmt: skip
     return replace(motion, root_positions=place, rotations=rotations)
 
@@ -84,6 +86,7 @@ def lock(
     *,
     floor: float | None = 0.0,
     blend: float = BLEND,
+    deepest: float = math.inf,
 ) -> tuple[Tensor, Tensor]:
     """`lock_feet` for many motions of equal length at once.
 
@@ -96,7 +99,7 @@ def lock(
     -------
     root_positions and rotations like those given.
     """
-    contacts = _checked(contacts, root_positions, floor, blend, fps)
+    contacts = _checked(contacts, root_positions, floor, blend, deepest)
     legs, kept = legs_alone(skeleton)
     joints = leg_joints(legs)
     points, world = _forward(legs, root_positions, _picked(rotations, kept))
@@ -111,7 +114,7 @@ def lock(
         onto = _onto_places(toes, held, ground)
         ankle = at["foot"] + onto
         ankle[..., 1] -= _usual(onto[..., 1], held)  # what a lower floor asks of all contacts alike
-        deep = _needed(at, ankle) > DEEPEST
+        deep = _needed(at, ankle) > deepest
         held = held & (length(onto) < FARTHEST) & ~deep
     shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
     shift = _above(shift, at, ground, ground - flat)
@@ -373,7 +376,7 @@ def _forward(skeleton: Skeleton, root_positions: Tensor, rotations: Tensor):
     )  # fmt: skip
 
 
-def _checked(contacts, root_positions: Tensor, floor, blend, fps) -> Tensor:
+def _checked(contacts, root_positions: Tensor, floor, blend, deepest) -> Tensor:
     """Contacts (..., frames, 2) of the toes; raises ModelError."""
     contacts = torch.as_tensor(contacts, device=root_positions.device)
     shape = tuple(contacts.shape)
@@ -388,4 +391,6 @@ def _checked(contacts, root_positions: Tensor, floor, blend, fps) -> Tensor:
         raise ModelError(
             f"lock_feet: blend {blend} s, floor {floor} m; both must be numbers, blend from 0."
         )
+    if not deepest >= 0:
+        raise ModelError(f"lock_feet: deepest is {deepest} m; it must be 0 or more.")
     return contacts if shape[-1] == 2 else contacts[..., [1, 3]]

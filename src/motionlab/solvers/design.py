@@ -32,6 +32,7 @@ from .run_up import begin_with, run_up
 from .windows import News
 
 STRIDE = 1.1  # seconds, of a walk
+DEEPEST = 0.05  # m that a lock may lower the body: who is held to a line has legs that can't reach
 HASTE = 3.0  # deviations above the data's mean step: nobody is faster
 SETTLED = 1.0  # seconds after which a path should be kept
 FAR, LATE, SLOWER = 0.05, 0.5, 0.15  # m, s, share of the speed: what is told
@@ -172,7 +173,7 @@ def finished(motion: Motion, refiner: Refiner | None = None, lock: bool = False)
     if lock:
         found = label(motion)  # the network tells a frame late now and then, the refiner another
         found = found if motion.contacts is None else found | motion.contacts
-        motion = lock_feet(motion, found, floor=None)
+        motion = lock_feet(motion, found, floor=None, deepest=DEEPEST)
     return motion
 
 
