@@ -146,6 +146,40 @@ def test_who_holds_a_broken_pose_begins_again_and_whole_ones_win(walker, monkeyp
     assert way.retries == len(judged) / 2 == -(-len(way.features[1:]) // 6)
 
 
+@pytest.mark.parametrize(
+    ("pace", "timed", "late"),
+    [(1.2, False, False), (1.0, False, False), (0.4, False, True), (2.2, False, True),
+     (1.2, True, False), (0.7, True, True), (1.7, True, True)],
+)  # fmt: skip
+def test_who_is_far_behind_or_before_is_late(walker, pace, timed, late):
+    """Of a line that is walked at 1.2 m/s; one with times gives no leeway."""
+    path = Path.through([[2, 1], [5, 1]], times=[0, 2.5] if timed else None)
+    table = path.timetable(None if timed else 1.2, 4.0, 30.0)
+    settings = windows.Settings(
+        4.0, path_control.wishes, {}, calm(), "adam", 1, 1, False, 0, 34, 17
+    )
+    before = beginning(walker, [path])
+    job = windows.Job(walker, [path], before, [windows.Way(table, [before.frame[0]])], settings)
+    features = before.frame[:, None].repeat(1, 34, 1)
+    facing = torch.remainder(torch.pi / 2 - before.place[0, 2], 2 * torch.pi)
+    features[..., :3] = torch.stack([facing.sin(), facing.cos(), facing * 0]) * pace / 30
+    features[..., 2] = 0.0
+    s = walker.normalizer(features)
+    solved = windows.Solved(s, torch.zeros_like(features), torch.zeros(1), 0)
+    rows = torch.arange(1)
+    assert bool(job._late(job._due(), solved, rows)) is late
+
+
+def test_who_begins_again_is_guided(walker, monkeypatch):
+    monkeypatch.setattr(windows, "ASTRAY", 0.0)
+    pushes, guided = [], windows.guided
+    monkeypatch.setattr(windows, "guided", lambda *a: pushes.append(a[-1]) or guided(*a))
+    table = STRAIGHT.timetable(1.2, 4.0, 30.0)
+    follow(walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [table], chance=calm(),
+           **QUICK | {"retries": 1})  # fmt: skip
+    assert pushes[:4] == [False, True, False, True]
+
+
 def test_better_is_lower_or_whole():
     first = windows.Solved(torch.zeros(3, 1), torch.zeros(3, 1), torch.tensor([1.0, 2, 3]), 1)
     again = windows.Solved(torch.ones(2, 1), torch.ones(2, 1), torch.tensor([9.0, 1]), 1)

@@ -75,8 +75,7 @@ def design(
         where they stand in the world, and the share of the path that is done, 0 to 1. Put together they
         are what is given in the end, before refiner and lock. KeyboardInterrupt in it leaves off.
     progress : show a bar. Interrupted (Ctrl-C), what is solved so far is given.
-    settings : of `path_control.follow`, such as weights, method, steps, candidates. `guide` is on for
-        a path with times, and off for others.
+    settings : of `path_control.follow`, such as weights, method, steps, candidates.
 
     Returns
     -------
@@ -123,8 +122,6 @@ def design_all(
     sampling = getattr(model, "sampling", {})
     chance = Chance(torch.Generator().manual_seed(seed), **sampling)
     before = run_up(model, begun, paths, paces, chance)
-    # whoever is to wait somewhere, or to hurry, has to be pushed: free samples keep their pace
-    settings.setdefault("guide", any(path.times is not None for path in paths))
     seen = None if watch is None else _shown(model, watch)
     found = follow(
         model, paths, before, tables, fastest=fastest, chance=chance, watch=seen, progress=progress,

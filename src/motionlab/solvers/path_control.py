@@ -5,7 +5,7 @@ window do not know yet what comes. In each,
 
 1. a few ways to go on are sampled, and the one of least energy is the first guess;
 2. `window.solve` descends from there, and goes on where that has not led near the path (`windows.LONGER`);
-3. who fell off his path, or his feet, begins again from other samples (`retries` times);
+3. who fell off his path, off his feet, or far behind begins again from guided samples (`retries` times);
 4. the first 17 frames stand fast, and the network's state goes on exactly behind them.
 
 All paths go side by side, as one batch.
@@ -107,7 +107,8 @@ def follow(
     method, steps : of `window.solve`.
     candidates : samples that the first guess is chosen from; guide : whether they are `guided` to the
         path, or free. Guided ones are nearer to it, and less of a walk: what the push bends stays bent,
-        and the end is no better. retries : times that a window which came to nothing begins again.
+        and the end is no better. retries : times that a window which came to nothing begins again, from
+        guided samples: free ones keep their own pace, and do not wait where one is to wait.
     window, overlap : frames; with a window of 1 and no overlap nobody looks ahead.
     chance : how samples are drawn; None: as the model's `sampling` says, from seed 0.
     watch : called behind each window, for each path that is still walked, with what newly stands fast.

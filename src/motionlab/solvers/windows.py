@@ -15,7 +15,7 @@ from torch import Tensor
 from ..metrics import broken
 from ..models import LstmGmm
 from ..models.sampler import Chance
-from ..paths import Curves, Path, Piece
+from ..paths import Curves, Near, Path, Piece
 from .energy import Before, Energy
 from .guided import Steering, guided
 from .terms import Term
@@ -24,6 +24,7 @@ from .window import DESCENTS, Solved, solve
 LONGER, ROUGH = 2, 0.012  # times; m, root mean square from the path in a window
 RETRIES = 2
 ASTRAY = 0.10  # m, root mean square from the path in a window: that is no following
+LATE, LEAST_LATE = 0.2, 0.2  # share of a window's way, and m, that may lack beyond the leeway
 STRANGE = 20.0  # deviations of the data from their mean: no body is there
 UNLIKELY = 60.0  # nats a frame less than samples have: the body comes apart
 RECENT = 10  # frames whose steps tell how somebody goes
@@ -123,7 +124,7 @@ class Job:
             lost = rows[self._astray(arcs, solved, rows)]
             if not len(lost):
                 break
-            again = self._solve(arcs, lost, *self._guess(arcs, lost))
+            again = self._solve(arcs, lost, *self._guess(arcs, lost, push=True))
             whole = ~self._astray(arcs, again, lost)
             solved = _better(solved, again, lost, whole)
             for number in self.which[lost].tolist():
@@ -177,8 +178,12 @@ class Job:
         return solved
 
     @torch.no_grad()
-    def _guess(self, arcs: Tensor, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """Of a few samples that of least energy; they begin with the tail of the window before."""
+    def _guess(self, arcs: Tensor, rows: Tensor, push: bool | None = None) -> tuple[Tensor, Tensor]:
+        """Of a few samples that of least energy; they begin with the tail of the window before.
+
+        push : whether they are led to the path; None: as the settings say.
+        """
+        push = self.how.guide if push is None else push
         many = rows.repeat_interleave(self.how.candidates)
         before, place, recent = self.before[many], self.before.place[many], self.recent[many]
         done, where = 0, self.arcs[many]
@@ -199,9 +204,7 @@ class Job:
         steering = Steering.after(
             self.curves, self.which[many], self.model.fps, place, where, recent[:, -RECENT:]
         )
-        new = guided(
-            self.model, before, steering, arcs[many, done:], self.how.chance, self.how.guide
-        )
+        new = guided(self.model, before, steering, arcs[many, done:], self.how.chance, push)
         if self.tail is not None:
             new = tuple(torch.cat([a[many], b], 1) for a, b in zip(self.tail, new, strict=True))
         energy = self._energy(arcs, many)
@@ -218,15 +221,33 @@ class Job:
     def _off(self, arcs: Tensor, solved: Solved, rows: Tensor) -> Tensor:
         """Metres (rows,), root mean square, from the path; 0 where nobody asks for one."""
         energy = self._energy(arcs, rows)
-        if "path" not in energy.terms:
-            return torch.zeros(len(rows))
-        before = energy.before
+        root, near = self._roots(arcs, solved, rows)
+        off = (root - near.places).square().sum(-1).mean(1).sqrt()
+        return off * self._asked(energy, "path")
+
+    def _roots(self, arcs: Tensor, solved: Solved, rows: Tensor) -> tuple[Tensor, Near]:
+        """Where roots are over the ground (rows, frames, 2), and the places of the path next to them."""
+        before = self.before[rows]
         features = torch.cat([before.frame[:, None], self.model.normalizer.inverse(solved.s)], 1)
         root = self.model.encoding.root_path(features, before.place)[:, 1:, [0, 2]]
         first, last = self.arcs[rows] - 0.5, arcs[rows].amax(1) + 2.0
-        piece = self.curves.piece(first, last, self.which[rows])
-        off = (root - piece.nearest(root).places).square().sum(-1).mean(1).sqrt()
-        return off * (torch.as_tensor(energy.weights.get("path", 1.0)) > 0)
+        return root, self.curves.piece(first, last, self.which[rows]).nearest(root)
+
+    @staticmethod
+    def _asked(energy: Energy, name: str) -> Tensor | bool:
+        """Whether a term is there and weighs something, for all or (rows,)."""
+        return name in energy.terms and torch.as_tensor(energy.weights.get(name, 1.0)) > 0
+
+    @torch.no_grad()
+    def _late(self, arcs: Tensor, solved: Solved, rows: Tensor) -> Tensor:
+        """Who (rows,) ends far behind his timetable, or before it."""
+        _, near = self._roots(arcs, solved, rows)
+        way = arcs[rows, -1] - arcs[rows, 0]
+        fixed = torch.tensor([self.paths[i].times is not None for i in self.which[rows].tolist()])
+        leeway = LEEWAY * self.model.fps / self.how.window * ~fixed
+        late = (near.arcs[:, -1] - arcs[rows, -1]).abs()
+        late = late > ((LATE + leeway) * way).clamp(min=LEAST_LATE)
+        return late & self._asked(self._energy(arcs, rows), "time")
 
     @torch.no_grad()
     def _astray(self, arcs: Tensor, solved: Solved, rows: Tensor) -> Tensor:
@@ -234,7 +255,7 @@ class Job:
         energy = self._energy(arcs, rows)
         features = self.model.normalizer.inverse(solved.s)
         likely = energy.mixture(features, solved.d).log_prob(solved.s).mean(1)
-        well = self._off(arcs, solved, rows) < ASTRAY
+        well = (self._off(arcs, solved, rows) < ASTRAY) & ~self._late(arcs, solved, rows)
         well &= solved.s.abs().amax((1, 2)) < STRANGE
         if broken.knows(self.model.encoding):
             well &= broken.beyond(self.model.encoding, features).amax(1) < 0
