@@ -201,7 +201,7 @@ def bad() -> dict[str, tuple[bytes, int, str]]:
         "scale twice": (replaced(_ZXY, "CHANNELS 2 Xscale xScale"), chest + 3, "twice"),
         "no channels": (
             re.sub("CHANNELS.*", "CHANNELS 0", PLAIN[:ROWS]),
-            end,
+            end + 1,
             "no joint has a channel",
         ),
         "rows wrapped, one value less": (
@@ -236,7 +236,17 @@ def bad() -> dict[str, tuple[bytes, int, str]]:
         "short OFFSET": (replaced("0.0 20.0 1.0", "0.0 20.0"), chest + 2, "2 numbers"),
         "no OFFSET": (replaced("    OFFSET 0.0 20.0 1.0\n", ""), chest + 3, "no OFFSET"),
         "two OFFSET": (replaced(_ZXY, f"OFFSET 1 2 3\n{_ZXY}"), chest + 3, "one too many"),
-        "no CHANNELS": (replaced(f"    {_ZXY}\n", ""), chest + 3, "no CHANNELS"),
+        "no CHANNELS, but values": (replaced(f"    {_ZXY}\n", ""), first - 1, "15 values for 12"),
+        "no OFFSET and no CHANNELS": (
+            replaced(f"    OFFSET 0.0 20.0 1.0\n    {_ZXY}\n", ""),
+            chest + 2,
+            "no OFFSET",
+        ),
+        "no channels, but values": (
+            re.sub("CHANNELS.*", "CHANNELS 0", PLAIN),
+            end + 1,
+            "no joint has a channel",
+        ),
         "two CHANNELS": (replaced(_ZXY, f"{_ZXY}\n{_ZXY}"), chest + 4, "one too many"),
         "zero frame time": (replaced("0.0333333", "0.0"), end + 2, "frame time is 0 s"),
         "negative frame time": (replaced("0.0333333", "-0.03"), end + 2, "fps="),

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
+from decimal import ROUND_DOWN, ROUND_HALF_EVEN, ROUND_HALF_UP, Decimal
+from types import SimpleNamespace
 
 import bvh_corpus as corpus
 import pytest
@@ -13,6 +16,7 @@ from hypothesis import strategies as st
 from motionlab import Motion, read_bvh, write_bvh
 from motionlab.errors import BvhError
 from motionlab.io.bvh import parse_bvh
+from motionlab.io.bvh_rate import rate_of
 
 
 def parse(text: str, **reading) -> Motion:
@@ -39,6 +43,61 @@ def test_a_joint_without_channels_can_be_written(tmp_path):
     write_bvh(motion, tmp_path / "clip.bvh")
     again = read_bvh(tmp_path / "clip.bvh")
     torch.testing.assert_close(again.positions(), motion.positions(), rtol=0, atol=1e-5)
+
+
+STILL = """HIERARCHY
+ROOT Hips
+{
+  OFFSET 1.0 90.0 2.0
+  JOINT Chest
+  {
+    OFFSET 0.0 20.0 1.0
+    JOINT Head
+    {
+      OFFSET 0.0 30.0 0.0
+      End Site
+      {
+        OFFSET 0.0 15.0 0.0
+      }
+    }
+  }
+}
+MOTION
+Frames: 3
+Frame Time: 0.0333333
+"""
+
+
+@pytest.mark.parametrize("said", ["", "CHANNELS 0\n"])
+@pytest.mark.parametrize("moving", ["", "Hips", "Chest", "Head"])
+def test_a_joint_without_channels_stands_still_at_its_offset(said, moving):
+    """bvhio writes channels for what moves alone; others leave the line out."""
+    text = re.sub(r"( OFFSET.*\n)(?! *})", rf"\1{said}", STILL)
+    if moving:
+        text = re.sub(
+            rf"({moving}\n *{{\n *OFFSET.*\n)(CHANNELS 0\n)?", r"\1CHANNELS 1 Zrotation\n", text
+        )
+    motion = parse(text + ("90\n" * 3 if moving else "\n" * 3), up="y")
+    assert motion.skeleton.names == ("Hips", "Chest", "Head") and len(motion) == 3
+    offsets = torch.tensor([[1, 90, 2], [0, 20, 1], [0, 30, 0]]) / 100
+    torch.testing.assert_close(motion.skeleton.offsets, offsets)
+    assert motion.root_positions[2].tolist() == pytest.approx([0.01, 0.9, 0.02])
+    turned = [not torch.equal(turn, torch.eye(3)) for turn in motion.rotations[1]]
+    assert turned == [name == moving for name in motion.skeleton.names]
+
+
+def test_a_root_of_positions_alone_does_not_turn():
+    """As bvhio writes one that walks straight ahead."""
+    text = STILL.replace("90.0 2.0\n", "90.0 2.0\n  CHANNELS 3 Xposition Yposition Zposition\n")
+    motion = parse(text + "0 90 0\n0 90 1\n0 91 0\n", up="y")
+    assert torch.equal(motion.rotations, torch.eye(3).expand(3, 3, 3, 3))
+    expected = torch.tensor([[0, 90, 0], [0, 90, 1], [0, 91, 0]]) / 100
+    torch.testing.assert_close(motion.root_positions, expected)
+
+
+def test_of_a_body_that_stands_still_no_more_frames_are_made_than_the_file_has_lines():
+    with pytest.raises(BvhError, match="no joint has a channel"):
+        parse(STILL.replace("Frames: 3", "Frames: 999999999") + "\n" * 3)
 
 
 def test_a_missing_position_of_an_inner_joint_is_its_offset():
@@ -114,6 +173,61 @@ def test_what_is_no_time_between_two_frames_is_told(written, remedy):
     with pytest.raises(BvhError, match=rf"line 32: the frame time is .*{remedy}$"):
         parse(text)
     assert parse(text, fps=30).fps == 30  # without a warning
+
+
+def written(rate: int, decimals: int, rounding: str) -> str:
+    return str((Decimal(1) / rate).quantize(Decimal(1).scaleb(-decimals), rounding))
+
+
+def test_every_whole_rate_that_a_rounded_time_can_mean_is_read_and_no_other():
+    """Of all headers with four to seven decimals, rounded or cut off."""
+    times = defaultdict(set)
+    for rate in range(20, 481):
+        for decimals in range(4, 8):
+            for rounding in (ROUND_DOWN, ROUND_HALF_EVEN, ROUND_HALF_UP):
+                times[written(rate, decimals, rounding)].add(rate)
+    unclear = {time for time, rates in times.items() if len(rates) > 1}
+    for time, rates in times.items():
+        fps, doubt = rate_of(SimpleNamespace(time=(7, time), fail=pytest.fail))
+        exact = 1 / float(time)
+        if time not in unclear:
+            assert ({fps}, doubt) == (rates, None), time
+        elif exact in rates:  # the file may mean what it says
+            assert (fps, doubt) == (exact, None), time
+        else:
+            assert fps == pytest.approx(exact, abs=1e-6), time
+            assert f"a frame time of {time} s is that of {min(rates)} to {max(rates)} " in doubt
+    assert {len(time) for time in unclear} == {6, 7}  # with six decimals all is clear
+
+
+@pytest.mark.parametrize(
+    "time, fps",
+    [
+        ("0.004166", 240),
+        ("0.016666", 60),
+        ("0.008333", 120),
+        ("4.1667e-3", 240),
+        ("16.66 ms", 60),
+        ("0.0333", 30),
+        ("0.0334", 29.97003),
+        ("0.0333667", 29.97003),
+        ("0.041708", 23.976024),
+        ("0.033334", 30),
+        ("0.0333333351", 30),
+        ("0.016", 62.5),
+    ],
+)
+def test_rates_that_are_meant(time, fps):
+    assert parse(corpus.PLAIN.replace("0.0333333", time)).fps == fps
+
+
+def test_of_two_rates_neither_is_taken():
+    with pytest.warns(
+        UserWarning, match=r"line 32: .* 120 to 121 frames .*read as 120\.482:.* fps=120\."
+    ):
+        assert parse(corpus.PLAIN.replace("0.0333333", "0.0083")).fps == pytest.approx(
+            120.482, abs=1e-3
+        )
 
 
 @pytest.mark.parametrize("written, fps", [("1", 1), ("0.5", 2), ("0.2", 5), ("0.001", 1000)])

@@ -56,7 +56,9 @@ def read_bvh(
     up : the file's axis that points up, one of "y", "-y", "z", "-z", "x", "-x". World and rest pose
         are turned so that y is up; of z-up, x, y, z become x, z, -y. None takes y. A trunk that is
         hardly ever upright then is warned of, unless "y" is said.
-    fps : frames per second, for a file whose own frame time is wrong.
+    fps : frames per second, for a file whose own frame time is wrong. One that was rounded, or cut off,
+        to four to seven decimals is taken for the rate from 20 to 480 that it can mean (0.004166: 240),
+        as it stands and with a warning if it can mean several (0.0042).
     root : the ROOT to read, by its name, of a file that holds several bodies.
     rigid : "mean" reads joints that slide against their parents, at their mean offset, and says how
         much that moves them; None refuses them if they slide by more than 1 mm.
@@ -68,7 +70,7 @@ def read_bvh(
     The root's position channels replace its OFFSET. A root that does nothing but carry the body
     (``joint_Root`` above ``Hips``) is folded into it; what else hangs there, such as an engine's
     targets for hands and feet, is left out with a warning. Channels that a joint lacks are zero,
-    positions its OFFSET; scale is left out. Rows are read as they are, with a warning if their
+    positions its OFFSET, also if it lacks all of them; scale is left out. Rows are read as they are, with a warning if their
     number is not the one declared; one that is cut off in the middle is refused, as the file has
     lost its end then.
 

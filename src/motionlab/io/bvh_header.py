@@ -153,9 +153,18 @@ class Layout:
         return self.trees[names.index(root)]
 
     def _hierarchy(self, number: int, words: list[str]) -> None:
-        if self._missing and words[0] in ("ROOT", "JOINT", "END", "}"):
-            lacking = " and no ".join(sorted(self._missing))
-            self.fail(number, f"the block before this line has no {lacking}", "add what is missing")
+        if words[0] in (
+            "ROOT",
+            "JOINT",
+            "END",
+            "}",
+        ):  # the block before is at its end, or goes deeper
+            if "OFFSET" in self._missing:
+                self.fail(number, "the block before this line has no OFFSET", "add what is missing")
+            if "CHANNELS" in self._missing:  # a joint that stands still needs none
+                self._missing.clear()
+                still = " ".join(self._channels(number, ["0"]))
+                self.trees[-1].lines.append((number, still))
         match words:
             case ["HIERARCHY"]:
                 return
@@ -255,8 +264,6 @@ class Layout:
             self.fail(number, f"{self._depth} '{{' are not closed", "close them before MOTION")
         if not self.trees:
             self.fail(number, "there is no ROOT", "the hierarchy needs one")
-        if not self.width:
-            self.fail(number, "no joint has a channel", "export the file with its motion")
 
     def _motion(self, number: int, words: list[str]) -> None:
         line = " ".join(words)

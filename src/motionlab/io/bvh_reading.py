@@ -76,7 +76,10 @@ def parse(data: bytes, where, how: Reading, source: str = "") -> tuple[Motion, D
     if rate is None:
         rate, doubts["rate"] = rate_of(layout)
     nodes = _parse_tree(tree, where)
-    values = parse_rows(text, first_row, layout.width, layout.frames, where)
+    if layout.width:
+        values = parse_rows(text, first_row, layout.width, layout.frames, where)
+    else:
+        values = _blank_rows(layout, text, first_row)
     doubts["frames"] = _doubt_count(layout, len(values), text)
     doubts["scale"] = tree.doubt_scale(values)
     angles, shifts = tree.sort(values)
@@ -103,6 +106,15 @@ def _with_roles(motion: Motion, how: Reading, where) -> Motion:
         return replace(motion, skeleton=replace(motion.skeleton, roles=how.roles))
     except SkeletonError as error:
         raise BvhError(f"{where}: {error}") from error
+
+
+def _blank_rows(layout: Layout, text: str, first_row: int) -> np.ndarray:
+    """Rows (frames, 0) of a body that stands still, so that no joint has a channel: blank lines."""
+    lines = text.count("\n") - layout.time[0] + 1
+    if text[first_row:].strip() or layout.frames > lines:
+        remedy = "export the file with its motion"
+        layout.fail(layout.frames_line, "no joint has a channel", remedy)
+    return np.zeros((layout.frames, 0))
 
 
 def _doubt_count(layout: Layout, rows: int, text: str) -> str | None:
