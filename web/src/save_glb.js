@@ -1,7 +1,7 @@
 // A motion as a .glb file: skeleton, animation, and the player's figure as a mesh that the joints carry,
 // as motionlab/io/gltf.py and gltf_mesh.py make it.
 import {
-  AnimationClip, Bone, BufferAttribute, Euler, MeshStandardMaterial, Object3D, Quaternion, QuaternionKeyframeTrack, Scene, Skeleton,
+  AnimationClip, Bone, BufferAttribute, Euler, MeshStandardMaterial, Quaternion, QuaternionKeyframeTrack, Scene, Skeleton,
   SkinnedMesh, Vector3, VectorKeyframeTrack,
 } from "three";
 import { GLTFExporter } from "three/addons/exporters/GLTFExporter.js";
@@ -10,16 +10,24 @@ import { addExtras } from "./motion.js";
 
 /** The file's bytes. `clip` as the track's `clip()` gives it; `name` is what the body and its animation are called. */
 export async function toGlb(clip, track, name) {
+  while (clip.skeleton.names.includes(name)) name += "Motion"; // assimp exports no animation that is called as a node is
   const turns = quaternions(clip);
   const points = nodes(clip.skeleton, bindPose(clip, turns));
   const scene = new Scene();
   scene.add(points[0]);
   scene.updateMatrixWorld();
-  if (track.bones.length) scene.add(skinned(track, clip.skeleton, points, name));
-  const times = Float32Array.from({ length: clip.root.length / 3 }, (_, frame) => frame / clip.fps);
+  if (track.bones.length) scene.add(skinned(track, clip.skeleton, points, `${name}_body`));
+  const times = keyTimes(clip);
   const moves = turns.map((values, joint) => new QuaternionKeyframeTrack(`${points[joint].uuid}.quaternion`, times, values));
   moves.unshift(new VectorKeyframeTrack(`${points[0].uuid}.position`, times, clip.root));
   return new GLTFExporter().parseAsync(scene, { binary: true, animations: [new AnimationClip(name, -1, moves)] });
+}
+
+/** A key at every frame, the last the least bit later: a player that begins anew at it would never show it. */
+function keyTimes({ root, fps }) {
+  const times = Float32Array.from({ length: root.length / 3 }, (_, frame) => frame / fps);
+  if (times.length > 1) new Uint32Array(times.buffer)[times.length - 1] += 1; // the next number of 32 bits
+  return times;
 }
 
 /** For each joint its quaternions, w last; of q and -q, which are the same turn, that nearer to the one before. */
@@ -52,14 +60,14 @@ function bindPose({ skeleton }, turns) {
   });
 }
 
-/** A node for every point, each below the joint it hangs on. */
+/** A node for every point, each below the joint it hangs on; an end site is a joint, too. */
 function nodes({ names, parents, offsets, end_parents, end_offsets }, pose) {
   const joints = names.map((name, joint) => {
     const bone = node(new Bone(), name, joint ? offsets[joint] : [0, 0, 0]);
     bone.quaternion.copy(pose[joint]);
     return bone;
   });
-  const ends = end_parents.map((parent, end) => node(new Object3D(), `${names[parent]}End`, end_offsets[end]));
+  const ends = end_parents.map((parent, end) => node(new Bone(), `${names[parent]}End`, end_offsets[end]));
   const points = [...joints, ...ends];
   [...parents, ...end_parents].forEach((parent, point) => { if (parent >= 0) joints[parent].add(points[point]); });
   return points;
@@ -93,7 +101,7 @@ function skinned(track, skeleton, points, name) {
   points[0].updateMatrixWorld();
   const mesh = new SkinnedMesh(geometry, new MeshStandardMaterial({ name, color: track.color, roughness: 0.55 }));
   mesh.name = name;
-  mesh.bind(new Skeleton(points.slice(0, skeleton.parents.length)));
+  mesh.bind(new Skeleton(points));
   return mesh;
 }
 
@@ -102,6 +110,7 @@ function carry(geometry, { bones, extras, middle }, skeleton, place) {
   const { position } = geometry.attributes;
   const ofBone = position.count / bones.length;
   const shares = sharesOf(skeleton, extras, middle);
+  const points = skeleton.parents.length + skeleton.end_parents.length;
   const [carriers, weights] = [new Uint16Array(4 * position.count), new Float32Array(4 * position.count)];
   const vertex = new Vector3();
   bones.forEach(([a, b], bone) => {
@@ -110,11 +119,12 @@ function carry(geometry, { bones, extras, middle }, skeleton, place) {
     const origin = new Vector3(...place(a));
     const axis = new Vector3(...place(b)).sub(origin);
     const length = Math.max(axis.lengthSq(), 1e-12);
+    const tip = b >= skeleton.parents.length && b < points ? b : null; // an end site carries a round end
     for (let i = bone * ofBone; i < (bone + 1) * ofBone; i++) {
       const along = Math.min(Math.max(vertex.fromBufferAttribute(position, i).sub(origin).dot(axis) / length, 0), 1);
       // no bone hangs on more than four joints: two for each of its ends
       [...blended(start, end, along)].filter(([, weight]) => weight > 0).forEach(([joint, weight], k) => {
-        carriers[4 * i + k] = joint;
+        carriers[4 * i + k] = along === 1 && tip !== null ? tip : joint;
         weights[4 * i + k] = weight;
       });
     }

@@ -29,7 +29,7 @@ from .bvh_reading import Doubts, Reading, parse, read
 from .bvh_units import in_metres
 from .bvh_up import check_up, turn_back, turned_back, vertical
 from .euler import to_euler
-from .root_motion import Parts, check_kind, root_name
+from .root_motion import Parts, check_kind, free_name
 from .root_motion import split as split_root
 
 
@@ -164,7 +164,7 @@ def write_bvh(
             else:
                 whole.write_text(header.text(motion, scale), encoding="utf-8")
             if root_motion == "ground":
-                _put_on_root(whole, root_name(names), parts, scale, up)
+                _put_on_root(whole, free_name(names), parts, scale, up)
             os.replace(whole, path)
     except OSError as error:
         raise BvhError(

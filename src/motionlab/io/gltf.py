@@ -1,7 +1,8 @@
 """Motion as glTF 2.0, from and for Blender, game engines, three.js and the viewers of many systems.
 
-The ``.glb`` file that is written holds the skeleton (a node per joint and end site), the animation,
-and a mannequin that the joints carry, so that there is something to see. Read is the skeleton of
+The ``.glb`` file that is written holds the skeleton, the animation, and a mannequin that the joints
+carry, so that there is something to see. End sites are joints of the skin, too, those of hands and
+toes with the tip to carry: the format has none, and a node that carries nothing is cleared away. Read is the skeleton of
 any file that has a skin or an animation. glTF's world is ours: metres, seconds, y up, z ahead,
 right-handed. The format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
 """
@@ -27,7 +28,7 @@ from ..version import __version__
 from .bvh_reading import Reading
 from .gltf_mesh import Skin, bind_pose, mannequin
 from .gltf_reading import read
-from .root_motion import Parts, check_kind, root_name, split
+from .root_motion import Parts, check_kind, free_name, split
 
 # Codes that glTF took from OpenGL.
 _COMPONENT = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
@@ -69,7 +70,8 @@ def read_gltf(
 
     Joints are the nodes that carry a skin, what the animation moves below them, and what lies
     between; without skin, the nodes that the animation moves and those between and below them. What
-    hangs on them with nothing to see becomes an end site. What is above, such as an armature's
+    hangs on them with nothing to see becomes an end site, and so does a last joint that is called
+    after the one it hangs on, as HeadEnd on Head. What is above, such as an armature's
     scale and quarter turn, goes into the joints' places. Offsets and rotations are the nodes' own,
     as bones are drawn there: the rest pose, all rotations zero, need not be a person's. A root that
     does nothing but carry the body is folded into it, as in `read_bvh`. Two nodes of one name are
@@ -109,13 +111,18 @@ def write_gltf(
 
     The file appears whole or not at all, and replaces one of that name. Between the frames programs
     interpolate as `Motion.resample` does. Contacts are not written: glTF has no place for them.
+    There is a key at every frame, the last at (frames - 1) / fps and the least bit more, so that a
+    player that begins anew once that time has come still shows the last frame. Who loops a cycle
+    gives it its first frame again at its end. An end site is a joint called after the one it hangs
+    on, as HeadEnd on Head; `read_gltf` makes end sites of these.
 
     Parameters
     ----------
     motion : any skeleton; the mannequin is fitted to it as in the player.
     path : must end in ``.glb``; a ``.gltf`` would be a third larger, or two files that get lost.
     color : a hex code, a name matplotlib knows, or a method's name ("mocap", "acLSTM", ...).
-    name : what the body and its animation are called in the file; None: as the motion.
+    name : what the animation is called in the file, and, with _body behind it, the mesh; None: as the
+        motion. assimp exports no file in which animation and node have one name.
     root_motion : "in-place" leaves way and heading out; "ground" puts them on a root joint on the
         floor, in whose frame the body moves (`motionlab.io.root_motion`).
 
@@ -161,7 +168,9 @@ class _Scene:
     `buffer`, the arrays that some of them are about."""
 
     def __init__(self, motion: Motion, name: str):
-        self.motion, self.name = motion, name
+        points = motion.skeleton.point_names
+        self.motion, self.name = motion, free_name(points, name)
+        self.body = free_name(points, f"{self.name}_body")
         self.root: int | None = None  # the node of a root joint on the floor, if there is one
         self.bound = bind_pose(motion)
         self.buffer = bytearray()
@@ -197,13 +206,18 @@ class _Scene:
         It is in the skin, too, so that programs that look for bones there find it.
         """
         self.root = len(self.json["nodes"])
-        name = root_name(self.motion.skeleton.point_names)
-        self.json["nodes"].append({"name": name, "children": [0]})
+        taken = [*self.motion.skeleton.point_names, self.name, self.body]
+        self.json["nodes"].append({"name": free_name(taken), "children": [0]})
         self.json["scenes"][0]["nodes"] = [self.root]
 
     def add_animation(self, parts: Parts | None) -> None:
         """Where the root is and how every joint is turned, each with a key at every frame."""
-        self.keys = self._add(np.arange(len(self.motion)) / self.motion.fps, "SCALAR", bounds=True)
+        times = (np.arange(len(self.motion)) / self.motion.fps).astype(np.float32)
+        if (
+            len(times) > 1
+        ):  # three's mixer begins anew at the last key, which rounding may put earlier
+            times[-1] = np.nextafter(times[-1], np.float32(np.inf))
+        self.keys = self._add(times, "SCALAR", bounds=True)
         self.json["animations"] = [{"name": self.name, "channels": [], "samplers": []}]
         self._move(0, self.motion.root_positions)
         turns = _quaternions(self.motion.rotations)
@@ -242,15 +256,15 @@ class _Scene:
         }
         indices = self._add(skin.triangles.ravel(), "SCALAR", dtype="<u4", **_TRIANGLES)
         primitive = {"attributes": attributes, "indices": indices, "material": 0}
-        joints = list(range(self.motion.skeleton.joints))
+        joints = list(range(self.motion.skeleton.points))
         joints += [] if self.root is None else [self.root]
-        self.json["materials"] = [{"name": self.name, "pbrMetallicRoughness": material}]
-        self.json["meshes"] = [{"name": self.name, "primitives": [primitive]}]
+        self.json["materials"] = [{"name": self.body, "pbrMetallicRoughness": material}]
+        self.json["meshes"] = [{"name": self.body, "primitives": [primitive]}]
         self.json["skins"] = [
             {"joints": joints, "inverseBindMatrices": self._inverse_bind_matrices(lift)}
         ]
         self.json["scenes"][0]["nodes"].append(len(self.json["nodes"]))
-        self.json["nodes"].append({"name": self.name, "mesh": 0, "skin": 0})
+        self.json["nodes"].append({"name": self.body, "mesh": 0, "skin": 0})
 
     def _stand_on_floor(self, skin: Skin) -> np.ndarray:
         """Lift the bind pose, which programs show when nothing plays, and say by how much, (3,)."""
@@ -261,7 +275,8 @@ class _Scene:
     def _inverse_bind_matrices(self, lift: np.ndarray) -> int:
         """From the world in the bind pose to each joint's frame; an accessor's index."""
         turns = self.bound.orientations()[0].double().numpy().swapaxes(-1, -2)
-        places = self.bound.positions()[0, : len(turns)].double().numpy() + lift
+        turns = np.concatenate([turns, turns[list(self.motion.skeleton.end_parents)]])
+        places = self.bound.positions()[0].double().numpy() + lift
         matrices = np.tile(np.eye(4), (len(turns), 1, 1))
         matrices[:, :3, :3] = turns
         matrices[:, :3, 3] = -(turns @ places[..., None])[..., 0]

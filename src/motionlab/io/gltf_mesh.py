@@ -94,6 +94,11 @@ def _weights(skeleton: Skeleton, dress, along: np.ndarray) -> tuple[np.ndarray, 
     start, end = (np.take_along_axis(part, joints, axis=1)[:, None] for part in (start, end))
     weights = start + along[..., None] * (end - start)
     joints = np.where(weights > 0, joints[:, None], 0)
+    for row, (_, tip, _, _) in enumerate(dress.bones):
+        if (
+            skeleton.joints <= tip < skeleton.points
+        ):  # the round end is the end site's, a joint there
+            joints[row, along[row] == 1] = np.where(weights[row, along[row] == 1] > 0, tip, 0)
     return joints.reshape(-1, INFLUENCES), weights.reshape(-1, INFLUENCES)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -90,6 +91,17 @@ class Nodes:
                 self.file.item("nodes", joint)
             found.update(joints)
         return found
+
+    def tips(self, skinned: set[int]) -> set[int]:
+        """Those of the joints of a skin that are end sites, as `write_gltf` names them: HeadEnd, which
+        hangs on Head and carries no other, also if a program has put a number behind the name."""
+        end = lambda node: re.escape(self.names[self.parents[node]]) + r"End(\.\d+)?"
+        return {
+            node
+            for node in skinned
+            if self.parents[node] in skinned and not self.children[node] and self.is_bare(node)
+            and re.fullmatch(end(node), self.names[node])
+        }  # fmt: skip
 
     def is_bare(self, node: int) -> bool:
         """Whether there is nothing to see of a node, nor to see by."""

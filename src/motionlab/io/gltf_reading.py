@@ -41,6 +41,8 @@ def parse(
     skinned = nodes.skinned()
     animation = _animation(nodes, skinned, how)
     moving = set() if animation is None else moved(file, animation)
+    tips = nodes.tips(skinned)
+    skinned, moving = skinned - tips, moving - tips
     known = _known(nodes, skinned, moving)
     root, doubts["beside"] = nodes.root(known, moving, how.root)
     known |= {node for node in moving.intersection(nodes.below(root)) if nodes.is_bare(node)}

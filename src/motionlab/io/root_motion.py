@@ -67,9 +67,8 @@ def check_kind(root_motion: str | None) -> None:
         )
 
 
-def root_name(names: Sequence[str]) -> str:
-    """What the root joint is called, which is none of these names."""
-    name = NAME
+def free_name(names: Sequence[str], name: str = NAME) -> str:
+    """What the root joint, or what else is added, is called, which is none of these names."""
     while name in names:
         name += "Motion"
     return name
