@@ -29,7 +29,8 @@ from .bvh_reading import Doubts, Reading, parse, read
 from .bvh_units import in_metres
 from .bvh_up import check_up, turn_back, turned_back, vertical
 from .euler import to_euler
-from .root_motion import Parts, check_kind, free_name
+from .free_names import free_name, safe_names
+from .root_motion import NAME, Parts, check_kind
 from .root_motion import split as split_root
 
 
@@ -109,6 +110,7 @@ def write_bvh(
     like: str | os.PathLike | None = None,
     overwrite: bool = True,
     root_motion: str | None = None,
+    names: str = "kept",
 ) -> None:
     """Write a motion as BVH, Euler angles in the skeleton's own rotation orders.
 
@@ -124,10 +126,14 @@ def write_bvh(
     root_motion : "in-place" leaves way and heading out; "ground" puts them on a root joint on the
         floor, in whose frame the body moves, by position channels (`motionlab.io.root_motion`).
         `read_bvh` folds such a root into the body again.
+    names : "kept", but for blanks and braces, which BVH can't have and which become _; or "safe", which
+        leaves letters, digits, - and _ alone, and tells apart by a number what becomes alike. three.js
+        takes : / [ ] in a name for marks of its own: such joints (mixamorig:Hips) stay still there.
 
     Raises
     ------
-    BvhError : the motion has no frames, the path can't be written, or `like` is of another rig.
+    BvhError : the motion has no frames, the path can't be written, `like` is of another rig, or comes
+        with names="safe".
     MotionError : there is no such root motion.
     """
     if not isinstance(motion, Motion) or not isinstance(path, str | os.PathLike):
@@ -143,12 +149,9 @@ def write_bvh(
         raise BvhError(f"{path}: the name must end in .bvh, for example {path.stem}.bvh.")
     if path.exists() and not overwrite:
         raise BvhError(f"{path}: is there already; pass overwrite=True to replace it.")
-    names = [re.sub(r"[\s{}]+", "_", name) for name in motion.skeleton.names]
-    if len(set(names)) < len(names):
-        raise BvhError(
-            f"{path}: without blanks and braces, which BVH can't have in names, two joints have "
-            "the same name; rename one of them."
-        )
+    if like is not None and names != "kept":
+        raise BvhError(f"{path}: names can't be safe and as in {like}; leave names= or like= out.")
+    words = _words(motion.skeleton.names, names, path)
     check_kind(root_motion)
     check_up(up)
     parts = None if root_motion is None else split_root(motion)
@@ -160,11 +163,11 @@ def write_bvh(
             whole = Path(folder) / "clip.bvh"
             if header is None:
                 pybvh.write_bvh_file(_clip(motion, scale), whole)
-                _restore_names(whole, names)
+                _restore_names(whole, words)
             else:
                 whole.write_text(header.text(motion, scale), encoding="utf-8")
             if root_motion == "ground":
-                _put_on_root(whole, free_name(names), parts, scale, up)
+                _put_on_root(whole, free_name(words, NAME), parts, scale, up)
             os.replace(whole, path)
     except OSError as error:
         raise BvhError(
@@ -174,6 +177,21 @@ def write_bvh(
         raise BvhError(
             f"{path}: joints are nested too deeply for pybvh to write; shorten the chain."
         ) from error
+
+
+def _words(names: Sequence[str], how: str, path: Path) -> list[str]:
+    """Names as a BVH file can have them, "kept" or "safe"."""
+    if how not in ("kept", "safe"):
+        raise BvhError(f"{path}: names={how!r} is not known; use 'kept' or 'safe'.")
+    if how == "safe":
+        return safe_names(names)
+    words = [re.sub(r"[\s{}]+", "_", name) for name in names]
+    if len(set(words)) < len(words):
+        raise BvhError(
+            f"{path}: without blanks and braces, which BVH can't have in names, two joints have "
+            "the same name; rename one of them, or pass names='safe'."
+        )
+    return words
 
 
 def _clip(motion: Motion, scale: float) -> pybvh.Bvh:

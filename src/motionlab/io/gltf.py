@@ -26,9 +26,10 @@ from ..errors import BvhError, GltfError
 from ..motion import Motion
 from ..version import __version__
 from .bvh_reading import Reading
+from .free_names import free_name
 from .gltf_mesh import Skin, bind_pose, mannequin
 from .gltf_reading import read
-from .root_motion import Parts, check_kind, free_name, split
+from .root_motion import NAME, Parts, check_kind, split
 
 # Codes that glTF took from OpenGL.
 _COMPONENT = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
@@ -207,7 +208,7 @@ class _Scene:
         """
         self.root = len(self.json["nodes"])
         taken = [*self.motion.skeleton.point_names, self.name, self.body]
-        self.json["nodes"].append({"name": free_name(taken), "children": [0]})
+        self.json["nodes"].append({"name": free_name(taken, NAME), "children": [0]})
         self.json["scenes"][0]["nodes"] = [self.root]
 
     def add_animation(self, parts: Parts | None) -> None:

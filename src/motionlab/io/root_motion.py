@@ -12,7 +12,6 @@ shoulders together do, which turn against each other in every step: it sways hal
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -65,13 +64,6 @@ def check_kind(root_motion: str | None) -> None:
             f"root_motion={root_motion!r} is not known; use {' or '.join(map(repr, KINDS))}, or leave "
             "it out."
         )
-
-
-def free_name(names: Sequence[str], name: str = NAME) -> str:
-    """What the root joint, or what else is added, is called, which is none of these names."""
-    while name in names:
-        name += "Motion"
-    return name
 
 
 def _facing(points: Tensor, roles: dict[str, int], root: Tensor) -> Tensor:
