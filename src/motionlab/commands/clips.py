@@ -19,13 +19,15 @@ from ..datasets.report import Report
 from ..errors import MotionFileError
 from ..io import write_bvh, write_gltf
 from ..io.bvh_reading import Reading
+from ..io.mjcf import write_mjcf
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import Readings
+from ..io.root_motion import in_place
+from ..io.usd import write_usd
 from ..motion import Motion
 from .folder import Taken
 from .options import as_options
-
-WRITERS = {".bvh": write_bvh, ".glb": write_gltf}
+from .programs import ANY, Program
 
 
 @dataclass(kw_only=True)
@@ -204,6 +206,21 @@ def check_no_fbx(out: Path) -> None:
         )
 
 
-def write(motion: Motion, path: Path, root_motion: str | None = None) -> None:
-    """Write a motion as what its name ends in says."""
-    WRITERS[path.suffix.lower()](motion, path, root_motion=root_motion)
+def write(
+    motion: Motion, path: Path, root_motion: str | None = None, program: Program = ANY
+) -> None:
+    """Write a motion as what its name ends in says, for a program."""
+    ending = path.suffix.lower()
+    if ending == ".bvh":
+        its = {"units": program.units, "up": program.up, "names": program.names}
+        write_bvh(motion, path, root_motion=root_motion, **its)
+    elif ending == ".glb":
+        write_gltf(motion, path, root_motion=root_motion)
+    elif root_motion == "ground":
+        raise MotionFileError(
+            f"{path}: files in {ending} get no root joint on the floor; leave --root-motion out, or "
+            "write .glb or .bvh."
+        )
+    else:
+        motion = in_place(motion) if root_motion else motion
+        (write_usd if ending == ".usda" else write_mjcf)(motion, path)

@@ -19,8 +19,9 @@ from ..motion import Motion
 from ..retargeting.flat_feet import Stance
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
-from .clips import WRITERS, Clips, files_of, write
+from .clips import Clips, files_of, write
 from .options import as_options
+from .programs import ANY, PROGRAMS, Program
 from .rig import CANONICAL, Rig, brought_onto
 
 MOST_FPS = 1000  # no one plays more; a slip of the finger would fill the memory
@@ -30,8 +31,8 @@ MOST_FPS = 1000  # no one plays more; a slip of the finger would fill the memory
 class Written(Clips):
     """What is written, and how."""
 
-    to: Literal["bvh", "glb"] = "bvh"
-    """What the files of a folder become."""
+    to: Literal["bvh", "glb", "usda", "xml"] | None = None
+    """What the files of a folder become; bvh if left out. An xml file is a model of MuJoCo."""
     fps: float | None = None
     """Frames per second of what is written, if others than of what is read."""
     root_motion: Literal[KINDS] | None = None
@@ -43,7 +44,25 @@ class Written(Clips):
             raise MotionLabError(
                 f"--fps {self.fps:g}: must be a number above 0, {MOST_FPS} at most."
             )
-        self.work(f".{self.to}", self._write_one, tuple(WRITERS))
+        program = self.program
+        ending = f".{self.to}" if self.to else program.endings[0]
+        if ending not in program.endings:
+            raise MotionLabError(
+                f"--to {self.to}: this program opens {', '.join(program.endings)}."
+            )
+        self.work(ending, self._write_one, program.endings)
+        if program.note:
+            print(f"note: {program.note}.")
+
+    @property
+    def program(self) -> Program:
+        """What the files are for."""
+        return ANY
+
+    @property
+    def _way(self) -> str | None:
+        """What becomes of way and heading."""
+        return self.root_motion or self.program.root_motion
 
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
         """The motion of a file as it is to be written, and what was done to it."""
@@ -55,11 +74,11 @@ class Written(Clips):
         if self.fps is not None:
             motion = motion.resample(self.fps)
         said += self._put(motion, target)
-        return "; ".join([_sizes(before, motion), *said, *_about_root(self.root_motion)])
+        return "; ".join([_sizes(before, motion), *said, *_about_root(self._way)])
 
     def _put(self, motion: Motion, target: Path) -> list[str]:
         """Write it, and what to say of how."""
-        write(motion, target, self.root_motion)
+        write(motion, target, self._way, self.program)
         return []
 
 
@@ -96,7 +115,7 @@ class Brought(Written, Rig):
             print(f"note: {self.path}: {as_options(said)}")
 
     def _put(self, motion: Motion, target: Path) -> list[str]:
-        return self.write(motion, target, self.root_motion)
+        return self.write(motion, target, self._way, self.program)
 
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
         if self.onto_name() is None:
@@ -108,12 +127,27 @@ class Brought(Written, Rig):
 class Convert(Brought):
     """Motion files into others: BVH for most programs, GLB for Blender, engines and browsers."""
 
+    for_: Annotated[Literal[tuple(PROGRAMS)] | None, arg(name="for")] = None
+    """The program that is to open what is written: sets format, unit, axes, names and root as it
+    needs them. What else is said goes first."""
     skeleton: Annotated[str | None, arg(metavar="RIG|canonical")] = None
     """Bring the motion to this rig, as `retarget` does; the files' own if left out. Where .amc files
     are read, an .asf file is what they are read by; if left out, it is looked for beside them."""
     rig_axes: bool = False
     """Write BVH as the rig's own BVH file is, as `retarget` does: its unit, axis up, joints, offsets
     and channels; without, y up and in centimetres, as all that `convert` writes."""
+
+    def run(self) -> None:
+        if self.for_ and self.rig_axes:
+            raise MotionLabError(
+                f"--for {self.for_} and --rig-axes: files are written as a program needs them, or as "
+                "the rig's file is; leave one of them out."
+            )
+        super().run()
+
+    @property
+    def program(self) -> Program:
+        return PROGRAMS[self.for_] if self.for_ else ANY
 
     def onto_name(self) -> str | None:
         return None if self._moves_amc else self.skeleton

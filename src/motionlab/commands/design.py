@@ -11,7 +11,8 @@ from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, WayError
 from ..io.root_motion import KINDS
-from .clips import WRITERS, check_no_fbx
+from .clips import check_no_fbx
+from .programs import ANY
 from .rig import Rig, brought_onto
 from .sample import check_seed, check_writable, refiner_of
 
@@ -29,7 +30,7 @@ class Design(Rig):
     path: Positional[Annotated[Path, arg(metavar="PATH.csv")]]
     """Places on the ground, one a line, under a header x,z, or t,x,z with seconds at which to be there."""
     out: Path
-    """File to write; its name ends in .bvh or .glb."""
+    """File to write; its name ends in .bvh, .glb, .usda or .xml."""
     speed: float | None = None
     """Metres a second, 1.2 if left out; not with times."""
     start: Annotated[str | None, arg(metavar="INDEX|NAME")] = None
@@ -60,9 +61,11 @@ class Design(Rig):
         from ..solvers.design import design_all, enlarged
         from ..weights import load
 
-        if self.out.suffix.lower() not in WRITERS:
+        if self.out.suffix.lower() not in ANY.endings:
             check_no_fbx(self.out)
-            raise MotionLabError(f"--out {self.out}: the name must end in {' or '.join(WRITERS)}.")
+            raise MotionLabError(
+                f"--out {self.out}: the name must end in {' or '.join(ANY.endings)}."
+            )
         points, times = read_path(self.path)
         check_seed(self.seed)
         check_writable(self.out)

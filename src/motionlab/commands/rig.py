@@ -20,6 +20,7 @@ from ..skeleton import Skeleton
 from .clips import write
 from .folder import Files
 from .options import as_options
+from .programs import ANY, Program
 
 CANONICAL = "canonical"
 _DEEP = 0.05  # metres below the floor that are told
@@ -73,17 +74,26 @@ class Rig:
             print(f"note: {name}: {_of_the_rig(said)}", flush=True)
         return rig
 
-    def write(self, motion: Motion, path: Path, root_motion: str | None = None) -> list[str]:
+    def write(
+        self,
+        motion: Motion,
+        path: Path,
+        root_motion: str | None = None,
+        program: Program = ANY,
+    ) -> list[str]:
         """Write a motion that was brought to the rig, and what to say of its axes and unit."""
         units, up = self.rig_units or "cm", self.rig_up or "y"
         if self._like is None or path.suffix.lower() != ".bvh":
-            write(motion, path, root_motion)
+            write(motion, path, root_motion, program)
             return []
         if self.rig_axes:
             write_bvh(motion, path, units=units, up=up, like=self._like, root_motion=root_motion)
             return [f"as the rig's file is: {up} up, units {units}"]
-        write(motion, path, root_motion)
-        return ["unlike the rig's file, y up and in centimetres"] * ((units, up) != ("cm", "y"))
+        write(motion, path, root_motion, program)
+        if (units, up) == (program.units, program.up):
+            return []
+        unit = {"cm": "centimetres", "m": "metres"}[program.units]
+        return [f"unlike the rig's file, {program.up} up and in {unit}"]
 
 
 def _of_the_rig(text: str) -> str:

@@ -14,7 +14,8 @@ from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, TrainingError
 from ..io.root_motion import KINDS
-from .clips import WRITERS, check_no_fbx
+from .clips import check_no_fbx
+from .programs import ANY
 from .rig import Rig, brought_onto
 
 if TYPE_CHECKING:
@@ -122,9 +123,11 @@ class Sample(Rig):
     def _paths(self) -> list[Path]:
         if not 1 <= self.characters <= 1000:
             raise MotionLabError(f"--characters {self.characters}: must be 1 to 1000.")
-        if self.out.suffix.lower() not in WRITERS:
+        if self.out.suffix.lower() not in ANY.endings:
             check_no_fbx(self.out)
-            raise MotionLabError(f"--out {self.out}: the name must end in {' or '.join(WRITERS)}.")
+            raise MotionLabError(
+                f"--out {self.out}: the name must end in {' or '.join(ANY.endings)}."
+            )
         if self.characters == 1:
             paths = [self.out]
         else:

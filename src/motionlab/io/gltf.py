@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import os
 import struct
-import tempfile
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,6 +29,7 @@ from .free_names import free_name
 from .gltf_mesh import Skin, bind_pose, mannequin
 from .gltf_reading import read
 from .root_motion import NAME, Parts, check_kind, split
+from .whole_file import put_whole
 
 # Codes that glTF took from OpenGL.
 _COMPONENT = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
@@ -153,15 +153,7 @@ def write_gltf(
         scene.put_on_root()
     scene.add_animation(parts)
     scene.add_mannequin(color)
-    content = scene.content()
-    try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".glb-") as folder:
-            whole = Path(folder) / "whole.glb"
-            whole.write_bytes(content)
-            os.replace(whole, path)
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        reason = getattr(error, "strerror", None) or error
-        raise GltfError(f"{path}: can't be written ({reason}); check folder and rights.") from error
+    put_whole(path, scene.content(), GltfError)
 
 
 class _Scene:
@@ -193,7 +185,7 @@ class _Scene:
             {"name": name, "translation": offset}
             for name, offset in zip(skeleton.point_names, offsets.tolist(), strict=True)
         ]
-        turns = _quaternions(self.bound.rotations)[0].tolist()
+        turns = quaternions(self.bound.rotations)[0].tolist()
         for node, turn in zip(nodes, turns, strict=False):  # end sites do not turn
             node["rotation"] = turn
         for point, parent in enumerate(skeleton.point_parents):
@@ -221,12 +213,12 @@ class _Scene:
         self.keys = self._add(times, "SCALAR", bounds=True)
         self.json["animations"] = [{"name": self.name, "channels": [], "samplers": []}]
         self._move(0, self.motion.root_positions)
-        turns = _quaternions(self.motion.rotations)
+        turns = quaternions(self.motion.rotations)
         for joint in range(self.motion.skeleton.joints):
             self._move(joint, turns[:, joint])
         if self.root is not None:
             self._move(self.root, parts.way)
-            self._move(self.root, _quaternions(parts.turn))
+            self._move(self.root, quaternions(parts.turn))
 
     def _move(self, node: int, values: Tensor) -> None:
         """Let a node go by translations (frames, 3), or turn by quaternions (frames, 4)."""
@@ -317,7 +309,7 @@ class _Scene:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def _quaternions(rotations: Tensor) -> Tensor:
+def quaternions(rotations: Tensor) -> Tensor:
     """Unit quaternions (frames, ..., 4), w last, of matrices (frames, ..., 3, 3).
 
     q and -q are the same rotation; each has the sign nearer to the one before it, as programs
