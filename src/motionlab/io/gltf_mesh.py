@@ -8,6 +8,8 @@ vertices are blended from one end to the other, and the trunk bends smoothly.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -62,8 +64,27 @@ def rest_stands(skeleton: Skeleton) -> bool:
     return skeleton.roles.keys() >= _STANDING and stands(skeleton)
 
 
+@dataclass(frozen=True)
+class _Bound:
+    """A body in its bind pose, equal to others of the same numbers."""
+
+    motion: Motion = field(compare=False)
+    body: tuple
+    numbers: bytes
+
+
 def mannequin(bound: Motion) -> Skin | None:
-    """Dress a body in its bind pose, one frame; None if no bone has a length."""
+    """Dress a body in its bind pose, one frame; None if no bone has a length. To be read alone: of a
+    folder's files, which mostly are of one body, all get the same arrays."""
+    its = bound.skeleton
+    numbers = torch.cat([its.offsets, its.end_offsets, *bound.rotations[0], bound.root_positions])
+    body = (its.names, its.parents, its.end_parents, tuple(its.roles.items()))
+    return _dressed(_Bound(bound, body, numbers.detach().cpu().numpy().tobytes()))
+
+
+@lru_cache(maxsize=4)
+def _dressed(pose: _Bound) -> Skin | None:
+    bound = pose.motion
     # Not at the top: the viewer brings its widgets along, and this module is loaded with the package.
     from ..viewer.pictures.body import body
     from ..viewer.pictures.picture import Figure, capsules
