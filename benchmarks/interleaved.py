@@ -125,12 +125,17 @@ def processor() -> str:
 
 
 def command(arguments: list[str]) -> str:
-    """How a script was called. A folder with another build is called by its commit: where it lay on
-    somebody's machine tells nobody anything."""
+    """How a script was called. A folder with another build is called by its commit, a file or program
+    by its name: where it lay on somebody's machine tells nobody anything."""
     words = [f"benchmarks/{Path(arguments[0]).name}"]
     for argument in arguments[1:]:
         option, equals, value = argument.rpartition("=")
-        words.append(f"{option}{equals}{commit(value) if Path(value).is_dir() else value}")
+        path = Path(value)
+        if path.is_dir():
+            value = commit(value)
+        elif path.is_absolute():
+            value = path.name
+        words.append(f"{option}{equals}{value}")
     return " ".join(["python", *words])
 
 

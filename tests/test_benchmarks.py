@@ -31,6 +31,8 @@ def test_a_recorded_command_names_no_folder_of_a_machine(interleaved, tmp_path):
     assert re.fullmatch("[0-9a-f]{7,}", words[3]) and words[4:] == ["--rounds=3", "--save"]
     told = interleaved.command(["bench_x.py", f"--against={tmp_path}"])
     assert told.endswith(f"--against={words[3]}")
+    program = str(tmp_path / "bin" / "python")
+    assert interleaved.command(["bench_x.py", "--blender", program]).endswith(" --blender python")
     plain = tmp_path.parent / "plain"
     plain.mkdir()
     assert interleaved.command(["bench_x.py", "--against", str(plain)]).endswith("unknown")
