@@ -145,7 +145,10 @@ def _lbfgs(search: _Search, free: Tensor, steps: int) -> None:
 
     def closure() -> Tensor:
         value, free.grad = search.slope(free)
-        return value.sum()
+        # a sum without a number would stop all windows, with an IndexError of the line search at that:
+        # a window that breaks counts as its best, without a slope, and the others go on
+        known = search.least.nan_to_num(posinf=0.0)
+        return torch.where(value.isfinite(), value, known).sum()
 
     optimizer.step(closure)
 
