@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -17,12 +17,12 @@ SECONDS = 600  # for one run of one script
 
 @dataclass(frozen=True)
 class Program:
-    """A program of registry.toml."""
+    """A program of registry.toml; one without script is there for traps alone."""
 
     name: str
     title: str
-    script: str
-    ways: dict[str, str]
+    script: str = ""
+    ways: dict[str, str] = field(default_factory=dict)
     pip: tuple[str, ...] = ()
     npm: tuple[str, ...] = ()
 

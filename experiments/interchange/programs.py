@@ -87,7 +87,7 @@ def through(
     facts = {"title": program.title, "package": program.pin[0], "pinned": program.pin[1]}
     if version is None:
         return facts | {"installed": False}
-    rows = []
+    rows: list[dict] = []
     for way, words in program.ways.items():
         for motion in given:
             row = {"way": words, "clip": motion.name}

@@ -1,7 +1,25 @@
 """Blender: BVH or glTF in and out, as it comes or with what has to be set."""
 
 import bpy
-from given import BACK_BVH, BACK_GLB, BVH, GLB, WAY
+from given import BACK_BVH, BACK_GLB, BVH, FOLDER, GLB, WAY, see
+
+
+def seen_in_scene():
+    """Tell where bones are in each frame of the action: in metres, z up."""
+    scene = bpy.context.scene
+    body = next(each for each in bpy.data.objects if each.type == "ARMATURE")
+    first, last = map(int, body.animation_data.action.frame_range)
+    positions, rotations = [], []
+    for frame in range(first, last + 1):
+        scene.frame_set(frame)
+        there = [body.matrix_world @ bone.matrix for bone in body.pose.bones]
+        positions.append([list(matrix.translation) for matrix in there])
+        turns = [matrix.to_quaternion() for matrix in there]
+        rotations.append([[turn.x, turn.y, turn.z, turn.w] for turn in turns])
+    rate = scene.render.fps / scene.render.fps_base
+    names = [bone.name for bone in body.pose.bones]
+    see(names=names, fps=rate, positions=positions, rotations=rotations)
+
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
 scene = bpy.context.scene
@@ -22,6 +40,20 @@ if WAY in ("bvh to glb", "bvh to glb, set"):
     options = {"update_scene_fps": True, "update_scene_duration": True, "global_scale": 0.01}
     bpy.ops.import_anim.bvh(filepath=BVH, **options)
     bpy.ops.export_scene.gltf(filepath=BACK_GLB, export_anim_slide_to_zero=WAY.endswith("set"))
+if WAY in ("fbx", "usd"):
+    options = {"update_scene_fps": True, "update_scene_duration": True, "global_scale": 0.01}
+    bpy.ops.import_anim.bvh(filepath=BVH, **options)
+    path = str(FOLDER / f"through.{WAY}")
+    if WAY == "fbx":
+        bpy.ops.export_scene.fbx(filepath=path)
+    else:
+        bpy.ops.wm.usd_export(filepath=path, export_animation=True)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if WAY == "fbx":
+        bpy.ops.import_scene.fbx(filepath=path)
+    else:
+        bpy.ops.wm.usd_import(filepath=path)
+    seen_in_scene()
 if WAY == "glb, set":
     import json
     import struct
