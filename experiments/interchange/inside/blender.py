@@ -40,16 +40,17 @@ if WAY in ("bvh to glb", "bvh to glb, set"):
     options = {"update_scene_fps": True, "update_scene_duration": True, "global_scale": 0.01}
     bpy.ops.import_anim.bvh(filepath=BVH, **options)
     bpy.ops.export_scene.gltf(filepath=BACK_GLB, export_anim_slide_to_zero=WAY.endswith("set"))
-if WAY in ("fbx", "usd"):
+if WAY in ("fbx", "fbx, set", "usd"):
     options = {"update_scene_fps": True, "update_scene_duration": True, "global_scale": 0.01}
     bpy.ops.import_anim.bvh(filepath=BVH, **options)
-    path = str(FOLDER / f"through.{WAY}")
-    if WAY == "fbx":
-        bpy.ops.export_scene.fbx(filepath=path)
+    path = str(FOLDER / f"through.{WAY[:3]}")
+    lossless = {"add_leaf_bones": False, "bake_anim_simplify_factor": 0.0}
+    if WAY.startswith("fbx"):
+        bpy.ops.export_scene.fbx(filepath=path, **(lossless if WAY.endswith("set") else {}))
     else:
         bpy.ops.wm.usd_export(filepath=path, export_animation=True)
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    if WAY == "fbx":
+    if WAY.startswith("fbx"):
         bpy.ops.import_scene.fbx(filepath=path)
     else:
         bpy.ops.wm.usd_import(filepath=path)

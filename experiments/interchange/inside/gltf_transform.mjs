@@ -5,5 +5,7 @@ import { back, folder, way } from "./given.mjs";
 
 const io = new NodeIO();
 const document = await io.read(`${folder}/clip.glb`);
-if (way !== "read and write") await document.transform(functions[way]());
+const [name, set] = way.split(", ");
+const options = set ? { keepLeaves: true } : {};
+if (name !== "read and write") await document.transform(functions[name](options));
 back(await io.writeBinary(document));
