@@ -76,7 +76,7 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
 
     section = README.partition("## A trained network")[2]
     commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", section, re.MULTILINE)
-    sample, still, walk, dance, prepare, train, *more = map(str.split, commands)
+    sample, still, walk, dance, export, prepare, train, *more = map(str.split, commands)
     tune, again, rival, dancer, game, mended = more
     # these need data, and minutes or hours
     assert prepare == ["prepare", "locomotion"]
@@ -100,6 +100,8 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     assert read_bvh("mine.bvh").seconds == 10
     assert main([*mended[:3], "refiner-contacts", *mended[4:]]) == 0  # its own needs the data
     assert read_bvh("refined.bvh").seconds == 10
+    pytest.importorskip("onnx")
+    assert main(export) == 0 and Path("lstm-gmm-permissive.onnx").stat().st_size > 1e6
 
 
 def test_the_commands_for_your_own_clips_run(tmp_path, monkeypatch, capsys):

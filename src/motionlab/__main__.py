@@ -18,6 +18,7 @@ from .commands.clean import Clean
 from .commands.convert import Convert, Retarget
 from .commands.design import Design
 from .commands.evaluate import Evaluate
+from .commands.export import Export
 from .commands.info import Info
 from .commands.look import Look
 from .commands.options import as_options
@@ -172,6 +173,7 @@ COMMANDS = (
     | Annotated[Evaluate, subcommand("evaluate")]
     | Annotated[Sample, subcommand("sample")]
     | Annotated[Design, subcommand("design")]
+    | Annotated[Export, subcommand("export")]
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Version, subcommand("version")]
 )

@@ -31,7 +31,8 @@ def licence(data: Prepared, start: str | os.PathLike | None = None) -> dict:
         return found | {"base": None}
     base = Path(start)
     _, about = load_weights(base)
-    its = about.get("licence") or _of_card(base.with_suffix(".md"))
+    card = base.with_suffix(".md")
+    its = of_weights(about, card.read_text(encoding="utf-8") if card.is_file() else "")
     return found | {
         "commercial": found["commercial"] and its["commercial"],
         "own": found["own"] or its["own"],
@@ -94,11 +95,12 @@ def _of_data(data: Prepared) -> dict:
     return {"sources": lines, "commercial": commercial, "own": own}
 
 
-def _of_card(card: Path) -> dict:
-    """As the card of shipped weights says that do not say it themselves; what nothing is known of is
-    not for commercial use."""
-    text = card.read_text(encoding="utf-8") if card.is_file() else ""
-    said = text.partition("\n## Licence\n")[2]
+def of_weights(about: dict, card: str) -> dict:
+    """As weights say themselves, in what is kept with them, or else as their card does (Markdown, or "");
+    what nothing is known of is not for commercial use."""
+    if about.get("licence"):
+        return about["licence"]
+    said = card.partition("\n## Licence\n")[2]
     sources = [line.removeprefix("* ") for line in said.splitlines() if line.startswith("* ")]
     return {
         "sources": sources or ["Of its data nothing is known."],

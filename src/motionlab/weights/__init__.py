@@ -3,7 +3,8 @@
     model = motionlab.load("lstm-gmm")
     features = model.generate(300, model.starts[2], **model.sampling)
 
-No data are needed. `experiments/shipping` makes the files.
+No data are needed. `experiments/shipping` makes the files; `weights.export` writes them for
+other programs.
 """
 
 from __future__ import annotations
