@@ -31,7 +31,7 @@ EXECUTED = BOOK / "_build" / "executed"
 FORMAT = 1  # raise it when what is kept changes
 TELL_EVERY = 30  # seconds
 # What pages may read besides themselves: the library, results, and what verdicts are computed by.
-READS = ("src/motionlab", "results", "experiments")
+READS = ("src/motionlab", "results", "experiments", "examples")
 NOT_READ = {"__pycache__", ".ipynb_checkpoints"}
 
 

@@ -159,7 +159,7 @@ def test_it_is_said_why_a_chapter_is_executed_again(write, keep, chapters):
     assert chapters.why(one, HERE) == "its code changed"
     now = chapters.surroundings()
     assert now == chapters.surroundings()
-    assert {"src/motionlab", "results", "experiments", "data at hand"} < {*now}
+    assert {"src/motionlab", "results", "experiments", "examples", "data at hand"} < {*now}
 
 
 def test_what_is_kept_is_not_trusted_if_damaged_or_of_another_version(write, keep, chapters):
