@@ -124,7 +124,7 @@ def test_broken_off_it_ends_the_same(train, smoke, tmp_path, monkeypatch, update
     assert_same(tmp_path / "broken", tmp_path / "undisturbed")
 
 
-@pytest.mark.parametrize("optimizer", ["rmsprop", "sgd"])
+@pytest.mark.parametrize("optimizer", ["rmsprop", "sgd", "adadelta"])
 def test_other_optimisers_go_on_as_well(train, smoke, tmp_path, monkeypatch, optimizer):
     preset = smoke(updates=12, validate_every=5, optimizer=optimizer)
     train(tmp_path / "undisturbed", preset)

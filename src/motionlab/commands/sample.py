@@ -193,6 +193,11 @@ def check_generates(model: nn.Module, name: str) -> None:
             f"{name}: is a PFNN, which makes no motion of its own; it is led along a path: "
             f"motionlab.models.pfnn.follow(motionlab.load({name!r}), [points], speed=1.2)."
         )
+    if hasattr(model, "extrapolate"):
+        raise MotionLabError(
+            f"{name}: is an STRNN, which goes on from frames and not from a state: "
+            f"motionlab.load({name!r}).extrapolate(features, 300)."
+        )
     if not hasattr(model, "generate"):
         raise MotionLabError(
             f"{name}: is a {type(model).__name__.lower()}, which corrects motion and makes none; name "

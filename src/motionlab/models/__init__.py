@@ -3,7 +3,7 @@
 Each keeps the same contract: ``observe(features)`` gives a state, ``step(x, state)`` goes on by one
 frame, ``generate(n, start)`` by many, and what is generative has ``log_prob``. Features are in raw
 units, as an encoding makes them; a state is a named tuple of tensors, batch first, so that nothing
-is hidden in the model.
+is hidden in the model. `Strnn` has no state: it goes on from the last frames, many at a time.
 """
 
 from .aclstm import AcLstm, auto_condition
@@ -13,6 +13,7 @@ from .noise import next_noise
 from .refiner import Discriminator, Refiner
 from .seq2seq import Seq2Seq
 from .state import State
+from .strnn import Strnn
 
 __all__ = [
     "AcLstm",
@@ -23,6 +24,7 @@ __all__ = [
     "Refiner",
     "Seq2Seq",
     "State",
+    "Strnn",
     "auto_condition",
     "next_noise",
 ]

@@ -18,10 +18,10 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import MotionLabError, TrainingError
-from ..models import AcLstm, Erd, LstmGmm, Refiner, Seq2Seq
+from ..models import AcLstm, Erd, LstmGmm, Refiner, Seq2Seq, Strnn
 from ..models.pfnn import Pfnn
 
-_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn)}
+_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn)}
 _STARTS = "starts."
 
 

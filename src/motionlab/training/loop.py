@@ -32,6 +32,7 @@ OPTIMIZERS = {
     "adam": torch.optim.Adam,
     "rmsprop": torch.optim.RMSprop,
     "sgd": lambda parameters, lr: torch.optim.SGD(parameters, lr, momentum=0.9),
+    "adadelta": lambda parameters, lr: torch.optim.Adadelta(parameters, lr, rho=0.95, eps=1e-8),
 }
 CHECKPOINT = "checkpoint.safetensors"
 # May change when a training goes on, as long as the updates already made would have been the same.

@@ -11,10 +11,8 @@ from tqdm import tqdm
 
 from ..encodings import JointAngles
 from ..errors import TrainingError
-from ..feet import contacts
 from ..models.pfnn import Layout, Pfnn
 from ..models.pfnn.examples import examples, normalizers
-from ..motion import Motion
 from .prepared import Prepared
 from .presets import Preset
 from .windows import Windows
@@ -71,7 +69,7 @@ def _rows(frames: int, data: Prepared, split: str) -> list[Tensor]:
     """Rows of each clip of a split that has some."""
     layout = _layout(frames, data)
     clips = tqdm(data.clips(split), f"rows of {split}", unit="clip", leave=False, delay=2)
-    rows = [examples(layout, _motion(data, clip)) for clip in clips]
+    rows = [examples(layout, data.motion(clip)) for clip in clips]
     rows = [some for some in rows if len(some)]
     if not rows:
         raise TrainingError(
@@ -79,14 +77,6 @@ def _rows(frames: int, data: Prepared, split: str) -> list[Tensor]:
             "and after them; train on longer clips, or with fewer frames."
         )
     return rows
-
-
-def _motion(data: Prepared, features: Tensor) -> Motion:
-    """The motion of features (frames, dim), with contacts of heels as well, which rows do not have."""
-    motion = data.encoding.to_motion(features)
-    down = contacts.label(motion)
-    down[:, [1, 3]] = motion.contacts[:, [1, 3]]
-    return replace(motion, contacts=down)
 
 
 # As of the LSTM-GMM, with as many frames in an update. paper: 20 times through all of `locomotion`.

@@ -26,6 +26,7 @@ from ..datasets.locomotion import bring
 from ..datasets.splits import LONG, SMALLEST, SPLITS, by_time
 from ..encodings import JointAngles, Normalizer, RootRelative
 from ..errors import DataError, TrainingError
+from ..feet import contacts
 from ..io.bvh_up import doubt_up
 from ..motion import Motion
 from ..retargeting.flat_feet import Stance
@@ -65,6 +66,15 @@ class Prepared:
         """Features (frames, dim) of each clip of a split."""
         each = zip(self.features.split(self.lengths.tolist()), self.splits, strict=True)
         return [clip for clip, its in each if its == split]
+
+    def motion(self, features: Tensor) -> Motion:
+        """The motion of rows (frames, dim) of `JointAngles`, with contacts of heels, which rows do not
+        have, by their rule; those of toes are the rows' own if they have some."""
+        motion = self.encoding.to_motion(features)
+        down = contacts.label(motion)
+        if motion.contacts is not None:
+            down[:, [1, 3]] = motion.contacts[:, [1, 3]]
+        return replace(motion, contacts=down)
 
     def without_contacts(self) -> Prepared:
         """The same clips as an encoding without contact channels, which come last, has them."""

@@ -16,7 +16,7 @@ from .prepared import Prepared
 from .run_on import run_on, running
 from .windows import Windows
 
-Optimizer = Literal["adam", "rmsprop", "sgd"]
+Optimizer = Literal["adam", "rmsprop", "sgd", "adadelta"]
 BEST, LAST = "best.safetensors", "last.safetensors"
 
 

@@ -1,0 +1,386 @@
+"""STRNN: twenty frames in, the same twenty and the next twenty out, all at once.
+
+Wang, Ho, Shum and Zhu (2021), *Spatio-temporal Manifold Learning for Human Motions via Long-horizon
+Modeling*, section 4. An LSTM reads some frames; from its last state a decoder says them again,
+backwards, and a predictor says those that follow. Who must say twenty frames ahead can't get by with
+repeating the last one. A network over all frames that were said takes the jumps out. The equations
+are lost from the text that we have; they are built anew from its words.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from numbers import Integral
+from typing import Self
+
+import torch
+from torch import Tensor, nn
+
+from .. import encodings
+from ..encodings import BodyFrame, Normalizer
+from ..errors import ModelError
+from .checks import as_features, check_noise, check_normalizer, checked_features
+from .noise import normal
+from .strnn_parts import SpatialDecoder, SpatialEncoder, part_channels
+
+# Of the training in three stages (section 4.2.4): all but the residual network, the residual network
+# by itself, the residual network behind the others, which stay as they are.
+FIRST, ALONE, BEHIND = 0, 1, 2
+
+
+class GoingOn(nn.Module):
+    """An LSTM layer that goes on from a state and hears what it has said itself.
+
+    What it says is a linear function of its own h. So to hear it is to have other weights for h: an
+    LSTM without input, which is one call for all frames, and no loop in Python.
+    """
+
+    def __init__(self, inputs: int, width: int) -> None:
+        super().__init__()
+        self.heard = nn.Linear(inputs, 4 * width)
+        self.own = nn.Linear(width, 4 * width, bias=False)
+        for parameter in self.parameters():
+            nn.init.uniform_(parameter, -(width**-0.5), width**-0.5)
+
+    def forward(
+        self, state: tuple[Tensor, Tensor], n: int, says: nn.Linear | None,
+        true: Tensor | None = None,
+    ) -> Tensor:  # fmt: skip
+        """Its h (batch, n, width) in the n frames after a state, h and C (1, batch, width) each.
+
+        says : makes what is heard of h; None: h is heard as it is.
+        true : (batch, n - 1, inputs), heard instead from the second frame on (unconditional decoding).
+        """
+        weight, bias = self.heard.weight, self.heard.bias
+        if says is not None:
+            weight, bias = weight @ says.weight, bias + weight @ says.bias
+        weight = self.own.weight + weight
+        alone = n if true is None else 1
+        nothing = state[0].new_zeros(state[0].shape[1], alone, 1)
+        h, *state = _lstm(nothing, state, weight.new_zeros(len(weight), 1), weight, bias)
+        if true is None or n == 1:
+            return h
+        more, *_ = _lstm(true, state, self.heard.weight, self.own.weight, self.heard.bias)
+        return torch.cat([h, more], 1)
+
+
+def _lstm(inputs: Tensor, state, heard: Tensor, own: Tensor, bias: Tensor):
+    """One layer in torch's own loop: h of all frames, and the last h and C."""
+    weights = [heard, own, bias, torch.zeros_like(bias)]
+    return torch.lstm(inputs, tuple(state), weights, True, 1, 0.0, True, False, True)
+
+
+class Strnn(nn.Module):
+    """Encoder, backward decoder and forward predictor, with a spatial and a residual network or without.
+
+    As it stands it is the paper's Composite_20_20; ``residual=False`` is its SpatioTemp, and
+    ``spatial=False, residual=False`` its Temporal. Other lengths are 39/1, 35/5, 30/10, 10/10, 5/5.
+
+    Features go in and come out in raw units; inside they are normalised. In `extrapolate`,
+    `reconstruct` and `project` nothing is dropped and batch norm has the statistics of the training,
+    whatever mode the network is in.
+
+    Parameters
+    ----------
+    encoding : `BodyFrame`. normalizer : fitted on the training split.
+    width : of the LSTM layers and of a frame's code, 512 in the paper; a multiple of 8.
+    encode, predict : frames that are read, and said again, and frames that are foretold.
+    spatial : encode and decode frames part by part (`strnn_parts`); otherwise frames are read as they
+        are, and said by one linear layer.
+    residual : four layers over all frames that were said, whose output is added to them. It begins as
+        nothing.
+    conditional : decoder and predictor hear what they have said; otherwise, in training, the true frame.
+    drop : share of the spatial network's units that are dropped in training.
+    smooth : w_s, what mean squared second differences cost in training, eq. 4 and 7; 0 is the paper's
+        MSE.
+    penalty : what mean squares of weights and codes cost in training.
+
+    Raises
+    ------
+    ModelError : another encoding, sizes that make no sense, a skeleton that lacks a part.
+    """
+
+    settings = (
+        "width", "encode", "predict", "spatial", "residual", "conditional", "drop", "smooth", "penalty"
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        encoding: BodyFrame,
+        normalizer: Normalizer,
+        width: int = 512,
+        encode: int = 20,
+        predict: int = 20,
+        *,
+        spatial: bool = True,
+        residual: bool = True,
+        conditional: bool = True,
+        drop: float = 0.1,
+        smooth: float = 0.0,
+        penalty: float = 0.0,
+    ) -> None:
+        super().__init__()
+        check_normalizer(encoding, normalizer)
+        _check(width, encode, predict, drop, smooth, penalty)
+        self.encoding, self.normalizer = encoding, normalizer
+        self.width, self.encode, self.predict = width, encode, predict
+        self.spatial, self.residual, self.conditional = spatial, residual, conditional
+        self.drop, self.smooth, self.penalty = drop, smooth, penalty
+        self.kept = kept = len(normalizer.kept)
+        size = kept
+        if spatial:
+            parts, size = part_channels(encoding, normalizer.kept.tolist()), width
+            self.enter = SpatialEncoder(parts, width, drop)
+            self.leave = SpatialDecoder(parts, width, drop)
+        else:
+            self.leave = nn.Linear(width, kept)
+        self.encoder = nn.LSTM(size, width, batch_first=True)
+        self.decoder, self.predictor = GoingOn(size, width), GoingOn(size, width)
+        if residual:
+            self.filter = _residual(self.frames * kept, width)
+        jerky = torch.ones(encoding.dim, dtype=torch.bool)  # a contact bit may jump
+        jerky[encoding.slices.get("contacts", slice(0))] = False
+        self.register_buffer("glides", jerky[normalizer.kept], persistent=False)
+
+    @property
+    def fps(self) -> float:
+        """Frames per second of the features."""
+        return self.encoding.fps
+
+    @property
+    def frames(self) -> int:
+        """Frames of a training window: those that are read and those that are foretold."""
+        return self.encode + self.predict
+
+    # -- windows ----------------------------------------------------------------------------------
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Of features (batch, encode, dim) the same and the next frames, (batch, encode + predict, dim)."""
+        features = checked_features(self, features)
+        if features.shape[1] != self.encode:
+            raise ModelError(f"{features.shape[1]} frames; this network reads {self.encode}.")
+        return self.normalizer.inverse(self._whole(self.normalizer(features)))
+
+    def loss(
+        self,
+        features: Tensor,
+        noise: Tensor | None = None,
+        lots: Tensor | None = None,
+        stage: Tensor | None = None,
+    ) -> Tensor:
+        """Mean squared error of decoded frames and of predicted ones, added (eq. 5, 6), normalised.
+
+        In training mode `smooth` and `penalty` are added, except where the residual network learns.
+
+        Parameters
+        ----------
+        features : (batch, encode + predict, dim).
+        noise : like features; added to what is read, in normalised units, not to what is to be said.
+        lots : (batch,) whole numbers; the first is the seed of what is dropped. None: nothing is.
+        stage : (batch,) of `FIRST`, `ALONE` or `BEHIND`, all alike; None: the whole network at once.
+        """
+        features = checked_features(self, features)
+        if features.shape[1] != self.frames:
+            raise ModelError(
+                f"Windows have {features.shape[1]} frames; this network learns from {self.frames}, "
+                f"{self.encode} to read and {self.predict} to foretell."
+            )
+        true = self.normalizer(features)
+        seen = true if noise is None else true + noise[..., self.normalizer.kept]
+        chance = lots if lots is None else torch.Generator(true.device).manual_seed(int(lots[0]))
+        stage = None if stage is None else int(stage[0])
+        if stage is not None and stage != FIRST:
+            # Of clean frames there is nothing to take away: it learns from frames with noise.
+            with torch.no_grad(), at_rest(self):
+                said = seen if stage == ALONE else self._said(seen[:, : self.encode])[0]
+            return self._error(self._filtered(said), true)
+        said, codes = self._said(seen[:, : self.encode], None if self.conditional else true, chance)
+        said = said if stage == FIRST else self._filtered(said)
+        error = self._error(said, true)
+        if self.training and self.smooth:
+            bends = said[..., self.glides].diff(n=2, dim=1)  # across the seam, too
+            error = error + self.smooth * bends.square().mean()
+        if self.training and self.penalty:
+            weights = torch.cat(
+                [p.flatten() for n, p in self.named_parameters() if "filter" not in n]
+            )
+            error = error + self.penalty * (weights.square().mean() + codes.square().mean())
+        return error
+
+    def _error(self, said: Tensor, true: Tensor) -> Tensor:
+        off = (said - true).square()
+        return off[:, : self.encode].mean() + off[:, self.encode :].mean()
+
+    def _said(
+        self, seen: Tensor, true: Tensor | None = None, chance: torch.Generator | None = None,
+        decoded: bool = True,
+    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """What decoder and predictor say of seen (batch, encode, kept), in the order of time, and h.
+
+        true : (batch, encode + predict, kept), what both hear if they do not hear themselves.
+        decoded : False leaves out the decoder's frames.
+        """
+        read = self.enter(seen, chance) if self.spatial else seen
+        _, state = self.encoder(read)
+        says = None if self.spatial else self.leave
+        back = ahead = None
+        if true is not None:
+            heard = self.enter(true, chance) if self.spatial else true
+            back = heard[:, 1 : self.encode].flip(1)  # after frame t was to be said, t is heard
+            ahead = heard[:, self.encode : -1]
+        codes = self.predictor(state, self.predict, says, ahead)
+        if decoded:  # the last frame first: that is the order in which they are remembered best
+            codes = torch.cat([self.decoder(state, self.encode, says, back).flip(1), codes], 1)
+        return (self.leave(codes, chance) if self.spatial else self.leave(codes)), codes
+
+    def _filtered(self, said: Tensor) -> Tensor:
+        """Frames (batch, encode + predict, kept) as the residual network leaves them."""
+        if not self.residual:
+            return said
+        return said + self.filter(said.flatten(1)).unflatten(1, said.shape[1:])
+
+    def _whole(self, seen: Tensor) -> Tensor:
+        return self._filtered(self._said(seen)[0])
+
+    # -- at run time ------------------------------------------------------------------------------
+
+    def extrapolate(
+        self,
+        features: Tensor,
+        n: int,
+        *,
+        noise: float = 0.0,
+        generator: torch.Generator | None = None,
+    ) -> Tensor:
+        """n frames (batch, n, dim) that go on from features (batch, frames, dim), in open loop.
+
+        The last `encode` frames are read, the next `predict` said, and so on from there. Of features
+        (frames, dim) it is (n, dim).
+
+        Parameters
+        ----------
+        noise : standard deviation of what is added to frames that are read, in normalised units.
+            Without it one start has one future, and it may end in a loop.
+        generator : source of chance, for the noise.
+
+        Raises
+        ------
+        ModelError : fewer frames than `encode`, another number of channels, NaN, or n below 1.
+        """
+        check_noise(noise)
+        if not isinstance(n, Integral) or n < 1:
+            raise ModelError(f"extrapolate: {n!r} frames; ask for 1 or more.")
+        seen, one = self._checked("extrapolate", features)
+        seen, made = seen[:, -self.encode :], []
+        with at_rest(self):
+            for _ in range(-(-n // self.predict)):
+                read = seen + noise * normal(seen, generator) if noise else seen
+                if self.residual:
+                    said = self._whole(read)[:, self.encode :]
+                else:
+                    said, _ = self._said(read, decoded=False)
+                made.append(said)
+                seen = torch.cat([seen, said], 1)[:, -self.encode :]
+        found = self.normalizer.inverse(torch.cat(made, 1)[:, :n])
+        return found[0] if one else found
+
+    def reconstruct(self, features: Tensor) -> Tensor:
+        """Features (batch, frames, dim) said again, `encode` frames at a time; like features.
+
+        The last window ends with the last frame. Raises ModelError as `extrapolate` does.
+        """
+        return self._again("reconstruct", features, self.encode)
+
+    def project(self, features: Tensor, step: int | None = None) -> Tensor:
+        """Features (batch, frames, dim) brought to the manifold: what is noise can't be said again.
+
+        Each frame is the mean of what is said of it in windows of `encode` frames, one every `step`
+        frames, by default a quarter of them. Raises ModelError as `extrapolate` does, and for a step
+        below 1 or beyond `encode`.
+        """
+        step = max(1, self.encode // 4) if step is None else step
+        if not isinstance(step, Integral) or not 1 <= step <= self.encode:
+            raise ModelError(f"project: step is {step!r}; it must lie between 1 and {self.encode}.")
+        return self._again("project", features, step)
+
+    def _again(self, what: str, features: Tensor, step: int) -> Tensor:
+        seen, one = self._checked(what, features)
+        last = seen.shape[1] - self.encode
+        total, count = torch.zeros_like(seen), seen.new_zeros(seen.shape[1], 1)
+        with at_rest(self):
+            for begin in sorted({*range(0, last, step), last}):
+                span = slice(begin, begin + self.encode)
+                said = self._whole(seen[:, span])[:, : self.encode]
+                if step == self.encode:  # tiles: what was said last counts
+                    total[:, span], count[span] = said, 1
+                else:
+                    total[:, span] += said
+                    count[span] += 1
+        found = self.normalizer.inverse(total / count)
+        return found[0] if one else found
+
+    def _checked(self, what: str, features: Tensor) -> tuple[Tensor, bool]:
+        """Normalised (batch, frames, kept), and whether they came without a batch."""
+        features = as_features(self, features)
+        one = features.ndim == 2
+        features = checked_features(self, features[None] if one else features)
+        if features.shape[1] < self.encode:
+            raise ModelError(
+                f"{what}: {features.shape[1]} frames; this network reads {self.encode} at a time, so "
+                "give as many or more."
+            )
+        return self.normalizer(features), one
+
+    # -- settings ---------------------------------------------------------------------------------
+
+    def config(self) -> dict:
+        """What `from_config` needs to build an untrained copy; fit for JSON."""
+        kept = {name: getattr(self, name) for name in self.settings}
+        return {
+            "encoding": self.encoding.config(), "kept": self.normalizer.kept.tolist(), **kept
+        }  # fmt: skip
+
+    @classmethod
+    def from_config(cls, config: dict) -> Self:
+        """A model of the right shapes, to be filled by `load_state_dict`."""
+        encoding = encodings.from_config(config["encoding"])
+        normalizer = Normalizer(encoding.dim, len(config["kept"]))
+        normalizer.kept.copy_(torch.tensor(config["kept"]))
+        return cls(encoding, normalizer, **{name: config[name] for name in cls.settings})
+
+
+@contextmanager
+def at_rest(model: nn.Module) -> Iterator[None]:
+    """A network as it is used: nothing is dropped, batch norm keeps its statistics."""
+    training = model.training
+    model.eval()
+    try:
+        yield
+    finally:
+        model.train(training)
+
+
+def _residual(size: int, width: int) -> nn.Sequential:
+    """Four layers over a window at once, of which the last says nothing at first."""
+    layers: list[nn.Module] = []
+    for before in (size, width, width):
+        layers += [nn.Linear(before, width), nn.ELU()]
+    last = nn.Linear(width, size)
+    nn.init.zeros_(last.weight)
+    nn.init.zeros_(last.bias)
+    return nn.Sequential(*layers, last)
+
+
+def _check(width, encode, predict, drop, smooth, penalty) -> None:
+    if not isinstance(width, Integral) or width < 8 or width % 8:
+        raise ModelError(f"Strnn: width is {width!r}; it must be a multiple of 8.")
+    for what, value in (("encode", encode), ("predict", predict)):
+        if not isinstance(value, Integral) or value < 1:
+            raise ModelError(f"Strnn: {what} is {value!r}; it must be a whole number from 1.")
+    if not 0 <= drop < 1:
+        raise ModelError(f"Strnn: drop is {drop!r}; it must be a share, from 0 to below 1.")
+    for what, value in (("smooth", smooth), ("penalty", penalty)):
+        if not 0 <= value < math.inf:
+            raise ModelError(f"Strnn: {what} is {value!r}; it must be a number from 0.")

@@ -1,0 +1,266 @@
+"""STRNN: in which order it says frames, what it hears, what it learns through, bad input."""
+
+import copy
+
+import pytest
+import torch
+
+from motionlab import Skeleton, datasets
+from motionlab.encodings import BodyFrame, JointAngles, Normalizer
+from motionlab.errors import ModelError
+from motionlab.models import Strnn
+from motionlab.models.strnn import ALONE, BEHIND, FIRST
+from motionlab.training.checkpoints import load_weights, save_weights
+
+KINDS = {
+    "temporal": {"spatial": False, "residual": False},
+    "spatiotemp": {"residual": False},
+    "composite": {},
+}
+LENGTHS = ((39, 1), (35, 5), (30, 10), (20, 20), (10, 10), (5, 5))
+
+
+@pytest.fixture(scope="module")
+def clips():
+    motions = datasets.load("gaits")[:6]
+    encoding = BodyFrame(motions[0].skeleton, motions[0].fps)
+    return encoding, torch.stack([encoding.encode(motion)[:40] for motion in motions]).double()
+
+
+def made(clips, kind="composite", width=16, encode=4, predict=3, **settings) -> Strnn:
+    encoding, features = clips
+    torch.manual_seed(0)
+    normalizer = Normalizer.fit(list(features.float()))
+    model = Strnn(encoding, normalizer, width, encode, predict, **KINDS[kind] | settings)
+    if model.residual:  # it begins as nothing
+        torch.nn.init.normal_(model.filter[-1].weight, std=0.1)
+    return model.double()
+
+
+def by_hand(model: Strnn, read: torch.Tensor, true: torch.Tensor | None = None) -> torch.Tensor:
+    """What a network without a spatial one says of read (batch, encode, kept): cells in a loop, as the
+    paper tells it. true : what is heard, (batch, encode + predict, kept)."""
+    width, cell = model.width, torch.nn.functional
+
+    def stepped(x, h, c, of_x, of_h, bias):
+        enter, keep, new, show = (cell.linear(x, of_x) + cell.linear(h, of_h) + bias).chunk(4, -1)
+        c = keep.sigmoid() * c + enter.sigmoid() * new.tanh()
+        return show.sigmoid() * c.tanh(), c
+
+    h = c = read.new_zeros(len(read), width)
+    its = model.encoder
+    for t in range(model.encode):
+        h, c = stepped(read[:, t], h, c, its.weight_ih_l0, its.weight_hh_l0,
+                       its.bias_ih_l0 + its.bias_hh_l0)  # fmt: skip
+    said = {}
+    for part, order in (
+        (model.decoder, range(model.encode - 1, -1, -1)),
+        (model.predictor, range(model.encode, model.frames)),
+    ):
+        own_h, own_c, heard = h, c, model.leave(h)
+        for t in order:
+            own_h, own_c = stepped(heard, own_h, own_c, part.heard.weight, part.own.weight,
+                                   part.heard.bias)  # fmt: skip
+            said[t] = model.leave(own_h)
+            heard = said[t] if true is None else true[:, t]
+    return torch.stack([said[t] for t in range(model.frames)], 1)
+
+
+@pytest.mark.parametrize("conditional", [True, False])
+def test_it_says_what_a_loop_of_cells_says(clips, conditional):
+    model = made(clips, "temporal", conditional=conditional)
+    true = model.normalizer(clips[1][:, :7])
+    found, _ = model._said(true[:, :4], None if conditional else true)
+    torch.testing.assert_close(found, by_hand(model, true[:, :4], None if conditional else true))
+
+
+def test_the_decoder_begins_with_the_last_frame(clips):
+    model = made(clips, "temporal")
+    read = model.normalizer(clips[1][:, :4])
+    before, _ = model._said(read)
+    with torch.no_grad():  # deaf to itself, its first word is as it was and the others are not
+        model.decoder.heard.weight.zero_()
+        model.decoder.own.weight[model.width :].mul_(0.5)
+    after, _ = model._said(read)
+    changed = (after - before).abs().amax((0, 2))
+    assert (changed[:4] > 1e-6).all() and (changed[4:] == 0).all()  # the predictor is another
+
+
+def test_decoder_and_predictor_begin_where_the_encoder_ends(clips):
+    model = made(clips, "temporal")
+    model.predictor.load_state_dict(model.decoder.state_dict())
+    said, _ = model._said(model.normalizer(clips[1][:, :4]))
+    torch.testing.assert_close(said[:, :4].flip(1)[:, :3], said[:, 4:])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("conditional", [True, False])
+def test_the_future_does_not_leak(clips, kind, conditional):
+    model = made(clips, kind, conditional=conditional).eval()
+    true = model.normalizer(clips[1][:, :7]).requires_grad_()
+    said, _ = model._said(true[:, :4], None if conditional else true)
+    for t in range(7):
+        (slope,) = torch.autograd.grad(said[:, t].sum(), true, retain_graph=True)
+        felt = slope.abs().amax((0, 2)) > 0
+        assert felt[:4].all()  # the encoder has read all of them
+        assert not felt[max(4, t) :].any()
+        assert felt[4:t].all() == (not conditional or t <= 4)
+
+
+def test_training_asks_for_both_means(clips):
+    model = made(clips)
+    windows = clips[1][:, :7]
+    said = model.normalizer(model(windows[:, :4]))
+    off = (said - model.normalizer(windows)).square()
+    wanted = off[:, :4].mean() + off[:, 4:].mean()
+    torch.testing.assert_close(model.loss(windows), wanted)
+
+
+def test_second_differences_cost_across_the_seam_but_not_in_contacts(clips):
+    model, windows = made(clips, "temporal"), clips[1][:, :7]
+    plain = model.loss(windows)
+    model.smooth = 0.5
+    said, _ = model._said(model.normalizer(windows)[:, :4])
+    bends = said[..., :-4].diff(n=2, dim=1).square().mean()
+    torch.testing.assert_close(model.loss(windows) - plain, 0.5 * bends)
+    torch.testing.assert_close(model.eval().loss(windows), plain)
+    assert model.encoding.feature_names[-4:] == tuple(
+        model.encoding.feature_names[i] for i in model.normalizer.kept[~model.glides].tolist()
+    )
+
+
+def test_the_penalty_is_of_weights_and_codes(clips):
+    model, windows = made(clips, "temporal", penalty=0.1), clips[1][:, :7]
+    _, codes = model._said(model.normalizer(windows)[:, :4])
+    weights = torch.cat([p.flatten() for p in model.parameters()])
+    wanted = 0.1 * (weights.square().mean() + codes.square().mean())
+    torch.testing.assert_close(model.loss(windows) - model.eval().loss(windows), wanted)
+
+
+def test_noise_disturbs_what_is_read_and_not_what_is_asked_for(clips):
+    model, windows = made(clips, "temporal"), clips[1][:, :7]
+    noise = torch.randn(windows.shape, generator=torch.Generator().manual_seed(0)).double()
+    ahead = noise.clone()
+    ahead[:, :4] = 0
+    assert model.loss(windows, noise) != model.loss(windows)
+    assert model.loss(windows, ahead) == model.loss(windows)
+
+
+def test_stages_teach_what_they_name(clips):
+    model, windows = made(clips), clips[1][:, :7]
+    residual = {name for name, _ in model.named_parameters() if name.startswith("filter")}
+    others = {name for name, _ in model.named_parameters()} - residual
+    noise = torch.full_like(windows, 0.1)
+    statistics = {name: part.clone() for name, part in model.named_buffers()}
+    for stage, learns in ((ALONE, residual), (BEHIND, residual), (FIRST, others)):
+        model.zero_grad()
+        model.loss(windows, noise, torch.arange(6), torch.full((6,), stage)).backward()
+        assert {n for n, p in model.named_parameters() if p.grad is not None} == learns
+        same = all(torch.equal(part, statistics[name]) for name, part in model.named_buffers())
+        assert same == (stage != FIRST) and model.training
+
+
+def test_what_is_dropped_hangs_on_the_lots_alone(clips):
+    model, windows = made(clips, drop=0.5), clips[1][:, :7]
+    losses = [model.loss(windows, lots=torch.full((6,), lot)) for lot in (1, 1, 2)]
+    assert losses[0] == losses[1] != losses[2]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("encode", "predict"), LENGTHS)
+def test_all_lengths_go_on(clips, kind, encode, predict):
+    model = made(clips, kind, 8, encode, predict)
+    windows = clips[1][:, : encode + predict]
+    assert model.loss(windows).isfinite()
+    before = copy.deepcopy(model.state_dict())
+    found = model.extrapolate(windows, 23)
+    assert found.shape == (6, 23, 73)
+    seen = windows[:, -encode:]
+    with torch.no_grad():
+        model.eval()
+        first = model(seen)[:, encode:]
+        torch.testing.assert_close(found[:, :predict], first[:, :23])
+        second = model(torch.cat([seen, first], 1)[:, -encode:])[:, encode:]
+        torch.testing.assert_close(found[:, predict : 2 * predict], second[:, : 23 - predict])
+    assert all(torch.equal(part, before[name]) for name, part in model.state_dict().items())
+
+
+def test_at_run_time_a_motion_does_not_depend_on_those_beside_it(clips):
+    model, windows = made(clips, drop=0.5), clips[1][:, :7]
+    for call in (lambda x: model.extrapolate(x, 5), model.reconstruct, model.project):
+        torch.testing.assert_close(call(windows)[2], call(windows[2]))
+    assert model.training
+
+
+def test_noise_at_run_time_has_a_source(clips):
+    model, windows = made(clips, "temporal"), clips[1]
+    go = lambda seed: model.extrapolate(
+        windows, 9, noise=0.1, generator=torch.Generator().manual_seed(seed)
+    )
+    assert torch.equal(go(1), go(1)) and not torch.equal(go(1), go(2))
+
+
+def test_frames_are_said_again_window_by_window(clips):
+    model, features = made(clips).eval(), clips[1][:, :10]
+    found = model.reconstruct(features)
+    assert found.shape == features.shape
+    for begin, span in ((0, slice(0, 4)), (4, slice(4, 6)), (6, slice(6, 10))):
+        wanted = model(features[:, begin : begin + 4])[:, span.start - begin : span.stop - begin]
+        torch.testing.assert_close(found[:, span], wanted)
+
+
+def test_a_projection_is_the_mean_of_all_that_is_said(clips):
+    model, features = made(clips).eval(), clips[1][:, :6]
+    said = torch.full((3, 6, 6, 73), torch.nan).double()
+    for begin in range(3):
+        said[begin, :, begin : begin + 4] = model(features[:, begin : begin + 4])[:, :4]
+    torch.testing.assert_close(model.project(features, step=1), said.nanmean(0))
+
+
+def test_what_was_learned_travels(clips, tmp_path):
+    model = made(clips).float()
+    save_weights(tmp_path / "some.safetensors", model, {})
+    again, _ = load_weights(tmp_path / "some.safetensors")
+    features = clips[1].float()
+    assert torch.equal(again.extrapolate(features, 5), model.extrapolate(features, 5))
+
+
+@pytest.mark.parametrize("what", ["extrapolate", "reconstruct", "project"])
+def test_frames_that_can_not_be_read(clips, what):
+    model, features = made(clips), clips[1]
+    call = getattr(model, what)
+    more = (3,) if what == "extrapolate" else ()
+    with pytest.raises(ModelError, match="3 frames; this network reads 4"):
+        call(features[:, :3], *more)
+    with pytest.raises(ModelError, match="shape"):
+        call(features[..., :60], *more)  # of another skeleton
+    with pytest.raises(ModelError, match="NaN"):
+        call(torch.full_like(features, torch.nan), *more)
+
+
+def test_numbers_that_make_no_sense(clips):
+    model, features = made(clips), clips[1]
+    for n in (0, -1, 2.5, None):
+        with pytest.raises(ModelError, match="1 or more"):
+            model.extrapolate(features, n)
+    for step in (0, 5, 1.5):
+        with pytest.raises(ModelError, match="step"):
+            model.project(features, step)
+    with pytest.raises(ModelError, match="noise"):
+        model.extrapolate(features, 3, noise=-1)
+    with pytest.raises(ModelError, match="learns from 7"):
+        model.loss(features)
+    with pytest.raises(ModelError, match="reads 4"):
+        model(features)
+    for wrong in ({"width": 12}, {"width": 0}, {"encode": 0}, {"predict": 1.5}, {"drop": 1},
+                  {"smooth": -1}, {"penalty": float("inf")}):  # fmt: skip
+        with pytest.raises(ModelError, match=next(iter(wrong))):
+            made(clips, **wrong)
+
+
+def test_another_encoding_or_normalizer(clips):
+    angles = JointAngles(Skeleton.canonical())
+    with pytest.raises(ModelError, match="BodyFrame"):
+        Strnn(angles, Normalizer(angles.dim))
+    with pytest.raises(ModelError, match="normalizer"):
+        Strnn(clips[0], Normalizer(9))
