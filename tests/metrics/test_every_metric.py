@@ -13,7 +13,7 @@ from torch import Tensor
 from motionlab import MotionLabError, Skeleton, contacts, metrics
 from motionlab.datasets import gaits
 from motionlab.kinematics import yaw_matrix
-from motionlab.metrics import change, feet, gait, path, prediction, smoothness
+from motionlab.metrics import bones, change, feet, gait, path, prediction, smoothness
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,9 @@ CASES = {
     ),
     "acceleration": Case(lambda c: smoothness.acceleration(c.positions, c.fps), 1, 0.02),
     "jerk": Case(lambda c: smoothness.jerk(c.positions, c.fps), 1, 0.02),
+    "bone_length_error": Case(
+        lambda c: bones.bone_length_error(1.1 * c.positions, c.skeleton).mean, 1, 0.001
+    ),
     "root_path_error rms": Case(lambda c: path.root_path_error(c.positions, c.curve).rms, 1, 0.01),
     "root_path_error mean square": Case(
         lambda c: path.root_path_error(c.positions, c.curve).mean_square, 2, 0.02

@@ -19,6 +19,8 @@ metric                            unit              what it asks
 `foot_skate_weighted`             cm/s              the same without contacts, weighted by height
 `penetration`, `floating`         cm                feet below, and above, the ground
 `acceleration`, `jerk`            m/s², m/s³        does it tremble?
+`bone_length_error`               cm                do bones keep their lengths?
+`seam_jumps`                      ratio             does it jump where windows meet?
 `root_path_error`                 cm, cm²           how far from the curve it was to follow?
 `speed`, `turn_rate`              m/s, rad/s        gait
 `cadence`, `step_length`          steps/min, m      gait
@@ -35,6 +37,7 @@ metric                            unit              what it asks
 ================================  ================  =============================================
 """
 
+from .bones import BoneError, bone_length_error
 from .bootstrap import Interval, bootstrap, jackknife
 from .broken import broken_frames
 from .change import feature_change, motion_change
@@ -55,19 +58,23 @@ from .loops import Loop, converged, loop, loop_tolerance, repetition
 from .manifold import Nearest, manifold_distance, nearest_window_distance, replay_share
 from .path import PathError, root_path_error
 from .prediction import at_milliseconds, mean_joint_error, npss, position_error
+from .seams import Seams, seam_jumps
 from .smoothness import acceleration, jerk
 from .table import table
 
 __all__ = [
+    "BoneError",
     "Frechet",
     "Interval",
     "Limits",
     "Loop",
     "Nearest",
     "PathError",
+    "Seams",
     "Survival",
     "acceleration",
     "at_milliseconds",
+    "bone_length_error",
     "bootstrap",
     "broken_frames",
     "cadence",
@@ -96,6 +103,7 @@ __all__ = [
     "repetition",
     "replay_share",
     "root_path_error",
+    "seam_jumps",
     "speed",
     "stagnations",
     "step_length",
