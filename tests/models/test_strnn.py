@@ -5,7 +5,8 @@ import copy
 import pytest
 import torch
 
-from motionlab import Skeleton, datasets
+from motionlab import Skeleton
+from motionlab.datasets import gaits
 from motionlab.encodings import BodyFrame, JointAngles, Normalizer
 from motionlab.errors import ModelError
 from motionlab.models import Strnn
@@ -22,7 +23,7 @@ LENGTHS = ((39, 1), (35, 5), (30, 10), (20, 20), (10, 10), (5, 5))
 
 @pytest.fixture(scope="module")
 def clips():
-    motions = datasets.load("gaits")[:6]
+    motions = [gaits.make(seconds=1.5, speed=1 + 0.2 * i, seed=i) for i in range(6)]
     encoding = BodyFrame(motions[0].skeleton, motions[0].fps)
     return encoding, torch.stack([encoding.encode(motion)[:40] for motion in motions]).double()
 
