@@ -1,0 +1,1 @@
+"""STRNN: what it foretells, and what becomes of it in open loop; the claims S."""

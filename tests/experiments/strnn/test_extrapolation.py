@@ -1,0 +1,108 @@
+"""Forecasts and open loops of networks whose answers are known."""
+
+import json
+import math
+
+import pytest
+import torch
+
+import motionlab
+from experiments.strnn import extrapolation
+from motionlab.datasets import gaits
+from motionlab.encodings import JointAngles, Normalizer
+from motionlab.errors import DataError
+from motionlab.training import PRESETS, Prepared, build
+from motionlab.training.checkpoints import save_weights
+from motionlab.training.strnn import in_body_frame
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """Walks of five seconds as `prepare` makes them."""
+    encoding = JointAngles(motionlab.Skeleton.canonical(), 30, contacts=True)
+    make = lambda i: gaits.make(seconds=5, speed=1 + 0.1 * i, turn_rate=0.2 * (i % 3 - 1), seed=i)
+    clips = [encoding.encode(make(i)) for i in range(8)]
+    splits = ("train",) * 5 + ("val",) * 3
+    return Prepared(
+        torch.cat(clips), torch.tensor([len(clip) for clip in clips]),
+        tuple(f"gaits/{i}" for i in range(8)), splits, encoding, Normalizer.fit(clips), "walks",
+    )  # fmt: skip
+
+
+def test_an_oracle_foretells_without_error(walks):
+    data = in_body_frame(walks)
+    (clip, *_) = clips = data.clips("val")
+    rows = torch.cat(clips)
+
+    def oracle(seen, n):
+        at = [int((rows == window[-1]).all(-1).nonzero()[0]) for window in seen]
+        return torch.stack([rows[i + 1 : i + 1 + n] for i in at])
+
+    found = extrapolation.forecasts(oracle, clips, data, 20)
+    assert [*found] == ["80 ms", "160 ms", "320 ms", "400 ms", "560 ms", "20 frames"]
+    assert max(found.values()) == 0
+    floors = extrapolation.floors(clips, data)
+    still, mean, ridge = (
+        floors[name] for name in ("zero velocity", "mean frame", "ridge regression")
+    )
+    assert still["80 ms"] < still["320 ms"] and ridge["80 ms"] < 0.3 * still["80 ms"]
+    assert 0.5 < mean["20 frames"] < 2
+
+
+def test_prefixes_come_from_the_middle(walks):
+    clips = in_body_frame(walks).clips("val")
+    found = extrapolation.prefixes(clips, 2, 20)
+    assert torch.equal(found[0], clips[0][55:75]) and torch.equal(found[1], clips[2][55:75])
+    with pytest.raises(DataError, match="200 frames"):
+        extrapolation.prefixes(clips, 2, 100)
+
+
+def test_real_motion_in_open_loop_is_sound_and_near_itself(walks):
+    data = in_body_frame(walks)
+    real = extrapolation.real_of(data)
+    made = torch.stack([clip[:140] for clip in data.clips("val")])
+    found = extrapolation.opened(made, data, real, 20)
+    assert found["alive"] == 1 and found["bones, worst (cm)"] < 0.1
+    assert found["movement, last minute, over real"] == pytest.approx(1, abs=0.5)
+    assert found["steps across seams"] == pytest.approx(1, abs=0.1)
+    assert found["largest shared end"] <= 1
+    near = extrapolation.manifold(made, data, real, data.clips("val"))
+    assert near["of real"] < 0.5 < near["to real"]  # real are those that were "made"
+
+
+def test_failures_are_told(walks):
+    data = in_body_frame(walks)
+    real = extrapolation.real_of(data)
+    clip = data.clips("val")[0][:140]
+    still, wild = clip[:1].repeat(140, 1), clip.clone()
+    still[:, data.encoding.slices["root"]][:, 6:] = 0
+    wild[70:] *= 100
+    found = extrapolation.opened(torch.stack([clip, still, wild]), data, real, 20)
+    assert found["failed"]["frozen"] == found["failed"]["diverged"] == 1
+    assert found["alive"] == pytest.approx(1 / 3)
+    assert "in loops, of those alive" not in extrapolation.opened(wild[None], data, real, 20)
+    gone = torch.full_like(wild, math.nan)
+    assert extrapolation.manifold(gone[None], data, real, [clip]) == {}
+
+
+def test_a_result_is_written(walks, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Prepared, "find", lambda name: walks)
+    preset = PRESETS["strnn-temporal"]["smoke"]
+    save_weights("some.safetensors", build(walks, preset), {"name": "strnn-temporal"})
+    extrapolation.main(
+        ["some.safetensors", "--starts", "2", "--frames", "150",
+         "--noise", "0", "0.1", "--output", "found.json"]
+    )  # fmt: skip
+    found = json.loads((tmp_path / "found.json").read_text())
+    (row,) = found["rows"].values()
+    assert row["weights"]["settings"]["spatial"] is False and row["decoded"] > 0.1
+    assert {"open loop, noise 0", "open loop, noise 0.1"} < set(row)
+    assert found["starts"] == 2 and set(found["real"]["by source"]) == {"gaits"}
+
+
+def test_other_weights_are_refused(tmp_path, walks):
+    preset = PRESETS["lstm-gmm-contacts"]["smoke"]
+    save_weights(tmp_path / "a.safetensors", build(walks, preset), {"name": "lstm-gmm"})
+    with pytest.raises(DataError, match="LstmGmm, no STRNN"):
+        extrapolation.main([str(tmp_path / "a.safetensors")])
