@@ -193,6 +193,17 @@ def test_at_run_time_a_motion_does_not_depend_on_those_beside_it(clips):
     assert model.training
 
 
+def test_weights_that_are_kept_at_run_time_are_those_of_now(clips):
+    model, windows = made(clips, "temporal"), clips[1]
+    with torch.no_grad():
+        before = model.extrapolate(windows, 5)
+        assert torch.equal(model.extrapolate(windows, 5), before)
+        model.leave.weight.mul_(0.9)
+        after = model.extrapolate(windows, 5)
+    assert not torch.equal(after, before)
+    torch.testing.assert_close(after, model.extrapolate(windows, 5))  # with a gradient: made anew
+
+
 def test_noise_at_run_time_has_a_source(clips):
     model, windows = made(clips, "temporal"), clips[1]
     go = lambda seed: model.extrapolate(

@@ -22,54 +22,14 @@ from .. import encodings
 from ..encodings import BodyFrame, Normalizer
 from ..errors import ModelError
 from .checks import as_features, check_noise, check_normalizer, checked_features
+from .going_on import GoingOn
 from .noise import normal
 from .strnn_parts import SpatialDecoder, SpatialEncoder, part_channels
+from .unchanged import made_of
 
 # Of the training in three stages (section 4.2.4): all but the residual network, the residual network
 # by itself, the residual network behind the others, which stay as they are.
 FIRST, ALONE, BEHIND = 0, 1, 2
-
-
-class GoingOn(nn.Module):
-    """An LSTM layer that goes on from a state and hears what it has said itself.
-
-    What it says is a linear function of its own h. So to hear it is to have other weights for h: an
-    LSTM without input, which is one call for all frames, and no loop in Python.
-    """
-
-    def __init__(self, inputs: int, width: int) -> None:
-        super().__init__()
-        self.heard = nn.Linear(inputs, 4 * width)
-        self.own = nn.Linear(width, 4 * width, bias=False)
-        for parameter in self.parameters():
-            nn.init.uniform_(parameter, -(width**-0.5), width**-0.5)
-
-    def forward(
-        self, state: tuple[Tensor, Tensor], n: int, says: nn.Linear | None,
-        true: Tensor | None = None,
-    ) -> Tensor:  # fmt: skip
-        """Its h (batch, n, width) in the n frames after a state, h and C (1, batch, width) each.
-
-        says : makes what is heard of h; None: h is heard as it is.
-        true : (batch, n - 1, inputs), heard instead from the second frame on (unconditional decoding).
-        """
-        weight, bias = self.heard.weight, self.heard.bias
-        if says is not None:
-            weight, bias = weight @ says.weight, bias + weight @ says.bias
-        weight = self.own.weight + weight
-        alone = n if true is None else 1
-        nothing = state[0].new_zeros(state[0].shape[1], alone, 1)
-        h, *state = _lstm(nothing, state, weight.new_zeros(len(weight), 1), weight, bias)
-        if true is None or n == 1:
-            return h
-        more, *_ = _lstm(true, state, self.heard.weight, self.own.weight, self.heard.bias)
-        return torch.cat([h, more], 1)
-
-
-def _lstm(inputs: Tensor, state, heard: Tensor, own: Tensor, bias: Tensor):
-    """One layer in torch's own loop: h of all frames, and the last h and C."""
-    weights = [heard, own, bias, torch.zeros_like(bias)]
-    return torch.lstm(inputs, tuple(state), weights, True, 1, 0.0, True, False, True)
 
 
 class Strnn(nn.Module):
@@ -224,16 +184,24 @@ class Strnn(nn.Module):
         """
         read = self.enter(seen, chance) if self.spatial else seen
         _, state = self.encoder(read)
-        says = None if self.spatial else self.leave
+        back_alone, ahead_alone = self._alone()
         back = ahead = None
         if true is not None:
             heard = self.enter(true, chance) if self.spatial else true
             back = heard[:, 1 : self.encode].flip(1)  # after frame t was to be said, t is heard
             ahead = heard[:, self.encode : -1]
-        codes = self.predictor(state, self.predict, says, ahead)
+        codes = self.predictor(state, self.predict, ahead_alone, ahead)
         if decoded:  # the last frame first: that is the order in which they are remembered best
-            codes = torch.cat([self.decoder(state, self.encode, says, back).flip(1), codes], 1)
+            codes = torch.cat(
+                [self.decoder(state, self.encode, back_alone, back).flip(1), codes], 1
+            )
         return (self.leave(codes, chance) if self.spatial else self.leave(codes)), codes
+
+    def _alone(self) -> list[tuple[Tensor, Tensor]]:
+        """Weights with which decoder and predictor hear themselves; at run time made once."""
+        says = None if self.spatial else self.leave
+        make = lambda: [part.alone(says) for part in (self.decoder, self.predictor)]
+        return make() if torch.is_grad_enabled() else made_of(self, "alone", make)
 
     def _filtered(self, said: Tensor) -> Tensor:
         """Frames (batch, encode + predict, kept) as the residual network leaves them."""
