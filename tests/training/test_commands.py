@@ -50,7 +50,7 @@ def test_train_prepares_trains_and_goes_on(here, capsys):
     assert f"from {tuned.start_names[0]!r}" in capsys.readouterr().out
 
 
-def test_a_pfnn_is_trained_and_said_to_be_led(here, capsys):
+def test_what_makes_no_motion_of_its_own_is_trained_and_says_so(here, capsys):
     assert main(["train", "pfnn", *SMOKE]) == 0
     said = capsys.readouterr().out
     assert "12 updates; best of validation" in said and "their card is best.md" in said
@@ -58,6 +58,14 @@ def test_a_pfnn_is_trained_and_said_to_be_led(here, capsys):
     assert motionlab.load(f"{folder}/best.safetensors").card.startswith("# pfnn\n")
     assert main(["sample", f"{folder}/best.safetensors", "--out", "a.bvh"]) == 1
     assert "is led along a path" in capsys.readouterr().err
+    assert main(["train", "strnn-temporal", *SMOKE]) == 0
+    assert "12 updates; best of validation" in capsys.readouterr().out
+    folder = "runs/strnn-temporal-smoke"
+    assert motionlab.load(f"{folder}/best.safetensors").card.startswith("# strnn-temporal\n")
+    assert main(["sample", f"{folder}/best.safetensors", "--out", "a.bvh"]) == 1
+    assert "goes on from frames" in capsys.readouterr().err
+    assert main(["train", "strnn", *SMOKE]) == 1  # too few for its three stages
+    assert "alone" in capsys.readouterr().err
 
 
 def test_permissive_weights_are_trained_on_what_is_free(here, monkeypatch, gaits):
