@@ -24,6 +24,7 @@ from ..errors import ModelError
 from .checks import as_features, check_noise, check_normalizer, checked_features
 from .going_on import GoingOn
 from .noise import normal
+from .overlap import mean_of_windows
 from .strnn_parts import SpatialDecoder, SpatialEncoder, part_channels
 from .unchanged import made_of
 
@@ -257,7 +258,8 @@ class Strnn(nn.Module):
     def reconstruct(self, features: Tensor) -> Tensor:
         """Features (batch, frames, dim) said again, `encode` frames at a time; like features.
 
-        The last window ends with the last frame. Raises ModelError as `extrapolate` does.
+        The last window ends with the last frame; where it overlaps the one before it, both count.
+        Raises ModelError as `extrapolate` does.
         """
         return self._again("reconstruct", features, self.encode)
 
@@ -275,18 +277,10 @@ class Strnn(nn.Module):
 
     def _again(self, what: str, features: Tensor, step: int) -> Tensor:
         seen, one = self._checked(what, features)
-        last = seen.shape[1] - self.encode
-        total, count = torch.zeros_like(seen), seen.new_zeros(seen.shape[1], 1)
+        say = lambda window: self._whole(window)[:, : self.encode]
         with at_rest(self):
-            for begin in sorted({*range(0, last, step), last}):
-                span = slice(begin, begin + self.encode)
-                said = self._whole(seen[:, span])[:, : self.encode]
-                if step == self.encode:  # tiles: what was said last counts
-                    total[:, span], count[span] = said, 1
-                else:
-                    total[:, span] += said
-                    count[span] += 1
-        found = self.normalizer.inverse(total / count)
+            found = mean_of_windows(seen, self.encode, step, say)
+        found = self.normalizer.inverse(found)
         return found[0] if one else found
 
     def _checked(self, what: str, features: Tensor) -> tuple[Tensor, bool]:
