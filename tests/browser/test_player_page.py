@@ -231,25 +231,56 @@ def test_knobs_change_the_motion_and_what_is_said_of_it(browser, page_file):
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+COLORS = """i => {
+  const canvas = document.querySelectorAll("figure canvas")[i];
+  const copy = Object.assign(document.createElement("canvas"), { width: 200, height: 100 });
+  const brush = copy.getContext("2d");
+  brush.drawImage(canvas, 0, 0, 200, 100);
+  return new Set(new Uint32Array(brush.getImageData(0, 0, 200, 100).data.buffer)).size;
+}"""
+
+
+def wait_drawn(page, number):
+    """Until a player shows a picture: many different pixels, not a blank."""
+    page.locator("figure.motionlab-player").nth(number).scroll_into_view_if_needed()
+    page.wait_for_function(f"i => ({COLORS})(i) > 200", arg=number, timeout=20_000)
+
+
 def test_more_players_than_webgl_contexts_all_show(browser, page_file):
     with opened(browser, page_file, reduced_motion="reduce") as page:
-        figures = page.locator("figure.motionlab-player")
-        for i in range(figures.count()):
-            figures.nth(i).scroll_into_view_if_needed()
-            page.wait_for_function(
-                "i => document.querySelectorAll('figure')[i].motionlab.casts && "
-                "!document.querySelectorAll('figure')[i].motionlab.dirty",
-                arg=i,
-                timeout=20_000,
-            )
-        # The first, long out of sight, keeps its picture: many different pixels, not a blank.
-        page.evaluate("window.scrollTo(0, 0)")
-        colors = first(page).evaluate(
-            "f => { const c = f.querySelector('canvas');"
-            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
-            "return new Set(new Uint32Array(d.buffer)).size }"
+        for number in range(page.locator("figure.motionlab-player").count()):
+            wait_drawn(page, number)
+        wait_drawn(page, 0)  # long out of sight
+
+
+def test_out_of_sight_it_holds_no_picture_and_in_print_it_does(browser, page_file):
+    held = "() => [...document.querySelectorAll('figure')].map(f => [!!f.motionlab.casts, f.querySelector('canvas').width])"
+    with opened(browser, page_file, reduced_motion="reduce") as page:
+        page.evaluate("const set = setTimeout; setTimeout = (f, ms) => set(f, ms / 100)")
+        wait_drawn(page, 0)
+        wait_drawn(page, 17)
+        page.wait_for_function(f"() => ({held})()[0][1] === 1")
+        assert page.evaluate(held)[0] == [False, 1] and page.evaluate(held)[17][0]
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert all(casts and width > 100 for casts, width in page.evaluate(held))
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+        assert page.evaluate(held)[0] == [False, 1] and page.evaluate(held)[17][0]
+        page.set_viewport_size({"width": 700, "height": 100})
+        page.evaluate(
+            "document.body.append(Object.assign(document.createElement('p'), { style: 'height: 2000px' }))"
         )
-        assert colors > 200
+        page.evaluate("scrollTo(0, document.body.scrollHeight)")
+        page.wait_for_function("__motionlab_stage_2.gone")  # nobody stands on it
+        wait_drawn(page, 1)
+
+
+def test_a_stage_that_the_browser_took_away_is_built_again(browser, page_file):
+    """Of a tab that lay in the background, say."""
+    with opened(browser, page_file, reduced_motion="reduce") as page:
+        wait_drawn(page, 0)
+        page.evaluate("globalThis.before = __motionlab_stage_2; before.renderer.forceContextLoss()")
+        page.wait_for_function("__motionlab_stage_2 !== before && !__motionlab_stage_2.gone")
+        wait_drawn(page, 0)
 
 
 def test_it_rests_when_out_of_view(browser, page_file):

@@ -4,6 +4,7 @@ import { Orbit } from "./camera.js";
 import { Clock } from "./clock.js";
 import { Mannequin } from "./mannequin.js";
 import { LINES } from "./ground.js";
+import { attend, forget } from "./loop.js";
 import { Contacts, disposeAll, Path, Trail } from "./marks.js";
 import { decode, ROOT_UNIT } from "./motion.js";
 import { addStyle } from "./style.js";
@@ -18,13 +19,13 @@ const LEAST_HEIGHT = 1.5; // metres that a view shows
 export class Player {
   /**
    * Build the player inside `host`. `still` is an image URL for machines without WebGL. Tracks and
-   * clock are those of the payload, unless the motion is still being made.
+   * clock are those of the payload, unless others are given: the motion is still being made.
    */
-  constructor(host, payload, still, tracks = decode(payload), clock = new Clock(payload.frames, payload.fps)) {
+  constructor(host, payload, still, given = null, clock = new Clock(payload.frames, payload.fps)) {
     addStyle(host);
     this.host = host;
     this.still = still;
-    this.tracks = tracks;
+    this.given = given;
     this.payload = payload;
     this.clock = clock;
     this.clock.speed = payload.speed ?? 1;
@@ -87,24 +88,33 @@ export class Player {
     this.paint(currentTheme());
   }
 
-  /** Figures are made when first seen: a page may hold many players. */
   seen(visible) {
     this.visible = visible;
-    if (visible && !this.casts) this.enter();
-    if (visible) turning.add(this);
-    else turning.delete(this);
-    keepTurning();
+    if (visible) this.enter();
+    else this.leave();
+    attend(this, visible);
   }
 
+  /** Figures are made when they come into sight and let go when they leave it: a page may hold many players. */
   enter() {
-    this.stage = sharedStage();
+    if (this.casts || !this.canvas.isConnected) return;
+    this.stage = sharedStage(this);
     if (!this.stage) return this.sayMissing();
     // Pixels of the picture per pixel of the page: while it rests, and while it moves.
-    this.fine = this.stage.software ? 1.5 : Math.min(globalThis.devicePixelRatio || 1, 2);
-    this.coarse = this.stage.software ? 1 : this.fine;
+    this.fine ??= this.stage.software ? 1.5 : Math.min(globalThis.devicePixelRatio || 1, 2);
+    this.coarse ??= this.stage.software ? 1 : this.fine;
     this.casts = this.tracks.map((track, i) => this.cast(track, i));
     this.dirty = true;
   }
+
+  leave() {
+    for (const actor of this.casts?.flat() ?? []) disposeAll(actor);
+    this.casts = this.decoded = null;
+    this.stage?.leave(this, this.canvas);
+  }
+
+  /** What was sent takes less room than what it becomes, which is there while somebody looks. */
+  get tracks() { return this.given ?? (this.decoded ??= decode(this.payload)); }
 
   /** What is drawn of a track. */
   cast(track, i) {
@@ -186,6 +196,10 @@ export class Player {
       this.refresh();
     }
     if (this.orbit.controls.update()) this.dirty = true;
+    if (this.stage?.gone && this.casts) {
+      this.leave();
+      this.enter(); // or it says that there is no other stage
+    }
     if (this.dirty && this.casts) this.draw();
   }
 
@@ -347,12 +361,12 @@ export class Player {
   }
 
   dispose() {
-    this.seen(false);
+    this.leave();
+    forget(this);
     this.sight.disconnect();
     this.resizing.disconnect();
     this.unwatchTheme();
     this.orbit.dispose();
-    for (const actor of this.casts?.flat() ?? []) disposeAll(actor);
   }
 }
 
@@ -367,24 +381,4 @@ function gridColumns(count, aspect) {
   let columns = count;
   while (columns > 1 && aspect / columns < 0.45) columns = Math.ceil(columns / 2);
   return columns;
-}
-
-// One loop moves all players that can be seen.
-const turning = new Set();
-let last = null;
-
-function turn(now) {
-  // A frame's time stamp may lie before the call that asked for it; after a long pause don't leap.
-  const seconds = Math.min(Math.max((now - last) / 1000, 0), 0.25);
-  last = now;
-  for (const player of turning) player.tick(seconds);
-  if (turning.size) requestAnimationFrame(turn);
-  else last = null;
-}
-
-function keepTurning() {
-  if (turning.size && last === null) {
-    last = performance.now();
-    requestAnimationFrame(turn);
-  }
 }

@@ -1,18 +1,20 @@
 // One renderer, one light and one floor for all players of a page. Browsers keep about sixteen WebGL
 // contexts and drop the oldest without asking; a chapter may hold more players than that. So players
-// take turns on this stage, and each copies the picture to a plain canvas of its own, where the last
-// one stays when the player leaves the window.
+// take turns on this stage, and each shows the picture on a plain canvas of its own, as long as it is
+// seen: a picture costs some megabytes, and so does a stage on which nobody stands.
 import { DirectionalLight, Group, HemisphereLight, PCFShadowMap, Scene, WebGLRenderer } from "three";
 import { Ground } from "./ground.js";
 
-const SHARED = "__motionlab_stage_1"; // widgets load this module once each
+const SHARED = "__motionlab_stage_2"; // widgets load this module once each
+const IDLE = 30_000; // milliseconds without a player in sight, after which the stage goes
 
-/** The page's stage, made when the first player comes into view; null where WebGL is missing. */
-export function sharedStage() {
-  if (!(SHARED in globalThis)) {
-    const machine = graphicsMachine();
+/** The page's stage, for a player who comes into view; null where WebGL is missing. */
+export function sharedStage(player) {
+  if (globalThis[SHARED] === undefined || globalThis[SHARED]?.gone) {
+    const machine = graphicsMachine(document.createElement("canvas"));
     globalThis[SHARED] = machine === null ? null : new Stage(machine);
   }
+  globalThis[SHARED]?.players.add(player);
   return globalThis[SHARED];
 }
 
@@ -20,7 +22,11 @@ class Stage {
   constructor(machine) {
     // Pictures drawn by the processor (no graphics card): spend fewer pixels.
     this.software = /swiftshader|llvmpipe|software|basic render/i.test(machine);
-    this.renderer = new WebGLRenderer({ antialias: !this.software, alpha: true, powerPreference: "low-power" });
+    this.players = new Set(); // who are seen
+    this.gone = false; // then there will be another; a browser, too, may take it away
+    const canvas = drawingCanvas();
+    canvas.addEventListener("webglcontextlost", () => { this.gone = true; });
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, alpha: true, powerPreference: "low-power" });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene = new Scene();
@@ -38,7 +44,7 @@ class Stage {
   }
 
   /**
-   * Draw views onto a 2d canvas. Each view: {actors, aim, middle, floor, spread, azimuth, x, y, width, height},
+   * Draw views onto a canvas. Each view: {actors, aim, middle, floor, spread, azimuth, x, y, width, height},
    * a rectangle in CSS pixels with y down; `aim()` gives its camera, `middle` is where floor and light go, `spread` the
    * metres around it that cast shadows, `azimuth` the side the sun is on.
    */
@@ -62,9 +68,22 @@ class Stage {
       this.renderer.setScissor(view.x, bottom, view.width, view.height);
       this.renderer.render(this.scene, view.aim());
     }
-    const brush = canvas.getContext("2d");
-    brush.clearRect(0, 0, canvas.width, canvas.height);
-    brush.drawImage(this.renderer.domElement, 0, 0);
+    hand(this.renderer.domElement, canvas);
+  }
+
+  /** A player is seen no more, and needs no picture; if nobody is for a while, the stage goes. */
+  leave(player, canvas) {
+    if (!this.players.delete(player)) return;
+    this.cast.clear();
+    canvas.width = canvas.height = 1;
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => this.players.size || this.close(), IDLE);
+  }
+
+  close() {
+    this.gone = true;
+    this.renderer.dispose();
+    this.renderer.forceContextLoss(); // else it is kept until memory is collected
   }
 
   /** The sun stands to the left of the first view, the rim light opposite; both travel along. */
@@ -83,9 +102,23 @@ class Stage {
   }
 }
 
-/** Name of what draws WebGL here ("" if the browser keeps it secret), null if nothing does. */
-function graphicsMachine() {
-  const gl = document.createElement("canvas").getContext("webgl2");
+/** A canvas to draw on: one whose picture can be handed over, where a browser draws WebGL on such. */
+function drawingCanvas() {
+  const there = globalThis.OffscreenCanvas && graphicsMachine(new OffscreenCanvas(1, 1)) !== null;
+  return there ? new OffscreenCanvas(1, 1) : document.createElement("canvas");
+}
+
+/** Show a picture on a canvas of the page: handed over, which takes less memory than a copy, or copied. */
+function hand(picture, canvas) {
+  if (picture.transferToImageBitmap) return canvas.getContext("bitmaprenderer").transferFromImageBitmap(picture.transferToImageBitmap());
+  const brush = canvas.getContext("2d");
+  brush.clearRect(0, 0, canvas.width, canvas.height);
+  brush.drawImage(picture, 0, 0);
+}
+
+/** Name of what draws WebGL on a canvas ("" if the browser keeps it secret), null if nothing does. */
+function graphicsMachine(canvas) {
+  const gl = canvas.getContext("webgl2");
   if (!gl) return null;
   const info = gl.getExtension("WEBGL_debug_renderer_info");
   const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
