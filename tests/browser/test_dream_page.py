@@ -163,6 +163,37 @@ def test_two_networks_of_a_page_keep_their_own(visit):
     assert by_turns == alone
 
 
+def test_two_networks_that_play_share_the_time(visit):
+    page = visit("both.html").page
+    load_all(page)
+    given = page.evaluate(
+        """() => [...document.querySelectorAll("figure.motionlab-dream")].map(({ motionlab }) => motionlab).map((figure, _, all) => {
+          for (const { player } of all) Object.assign(player.clock, { playing: true }), player.seen(true);
+          let given;
+          figure.dreamer.reach = (frame, milliseconds) => { given = milliseconds; };
+          figure.player.clock.tick(0.1);
+          return given;
+        })"""
+    )
+    assert given == pytest.approx([25, 25])  # together half of it
+
+
+def test_a_pace_is_judged_by_the_time_that_somebody_looked(visit):
+    """A tab that was in the background made few frames, and its machine is not busy."""
+    page = visit().page
+    figure = load(page)
+    until(page, "figure.dreamer.last > 5")
+    said = """(figure, asked) => {
+      const { motionlab: { dreamer, player, panel }, motionlab } = figure;
+      player.clock.asked = asked;
+      motionlab.told = dreamer.last - 3;
+      motionlab.tellCost();
+      return panel.status.textContent;
+    }"""
+    assert "busy" not in figure.evaluate(said, 3)
+    assert "busy: 3 frames a second instead of 30" in figure.evaluate(said, 30)
+
+
 @pytest.mark.parametrize("lacking", ["WebAssembly", "WebAssembly.validate", "WebAssembly.Memory"])
 def test_a_browser_without_simd_goes_on(browser, folder, visit, lacking):
     """In plain JavaScript, and to the same place."""

@@ -50,6 +50,22 @@ const answers = {
     return { next, points, yaws };
   },
 
+  /** What is said of weights of which one part, a path to text or list, is but half there; "" if nothing is. */
+  halves({ name, parts }) {
+    return parts.map((path) => {
+      const file = structuredClone(globalThis.motionlabWeights[name]);
+      const [last, ...rest] = [...path].reverse();
+      const owner = rest.reverse().reduce((inner, key) => inner[key], file);
+      owner[last] = owner[last].slice(0, 8 * Math.floor(owner[last].length / 16));
+      try {
+        readWeights(file);
+        return "";
+      } catch (error) {
+        return error.message;
+      }
+    });
+  },
+
   /** Points (frames, characters, ...) and contacts of the first character that a Dreamer makes. */
   dream({ name, frames, change, later = {} }) {
     const dreamer = new Dreamer(weights(name), look, { ...settings, ...change });

@@ -173,3 +173,13 @@ def test_a_browser_without_goes_on_in_plain_javascript(ask, dreamt, fast, withou
 def test_weights_that_are_not_rounded_stay_as_they_are(ask):
     said = ask("apart", "exact", frames=5, change={})
     assert said["simd"] == [False, False] and max(said["worst"]) == 0
+
+
+def test_weights_of_another_size_are_told(ask):
+    """Half a file, or layers of two networks: a sentence, and no motion made of what is not there."""
+    layer = lambda *path: [["layers", *path, part] for part in ("weight", "bias")]
+    start = [["starts", 0, part] for part in ("frame", "hidden", "cell")]
+    parts = [*layer("enter", 0), *layer("lstm", 1), *layer("leave"), *start, ["kept"], ["mean"]]
+    for name in ("exact", "rounded"):
+        said = ask("halves", name, parts=parts)
+        assert all("don't fit together" in sentence for sentence in said), said

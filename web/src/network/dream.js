@@ -8,6 +8,7 @@ import { Panel } from "./panel.js";
 import { loadWeights, readWeights } from "./weights.js";
 
 const TELL_EVERY = 1000; // milliseconds
+const LEAST_SEEN = 0.5; // seconds of play from which a pace is judged
 const RESTARTS = ["start", "seed"]; // what can't change in the middle of a motion
 
 export class Dream {
@@ -61,14 +62,18 @@ export class Dream {
     this.player.refresh();
   }
 
-  /** What a frame costs, and whether they keep up with the clock. */
+  /** What a frame costs, and whether they keep up with the clock, which rests while nobody looks. */
   tellCost() {
     const { cost, last, settings, fps, network, exploded } = this.dreamer;
+    const { clock, playing } = this.player;
     const made = last - (this.told ?? last);
+    const seconds = clock.asked / (fps * clock.speed);
     this.told = last;
-    if (!cost || !this.player.playing || made <= 0) return;
+    clock.asked = 0;
+    if (!cost || !playing || made <= 0) return;
     const many = settings.characters > 1 ? ` of ${settings.characters} characters` : "";
-    const slow = made < 0.8 * fps * this.player.speed ? ` This machine is busy: ${made} frames a second instead of ${fps * this.player.speed}.` : "";
+    const busy = seconds > LEAST_SEEN && made < 0.8 * seconds * fps * clock.speed;
+    const slow = busy ? ` This machine is busy: ${Math.round(made / seconds)} frames a second instead of ${fps * clock.speed}.` : "";
     const same = many && network.certain && !settings.noise ? " Without noise a start has one future: all do the same." : "";
     const fallen = exploded ? ` A motion fell apart and began again: ${exploded} so far.` : "";
     this.say(`Runs here, in this page: ${cost.toFixed(1)} ms for a frame${many}.${same}${fallen}${slow}`);

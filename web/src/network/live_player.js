@@ -1,17 +1,19 @@
 // The player of a motion that is being made while it plays, without end.
 import { Clock } from "../clock.js";
+import { making } from "../loop.js";
 import { Mannequin } from "../mannequin.js";
 import { Contacts, disposeAll, Tail } from "../marks.js";
 import { Player, TWIST } from "../player.js";
 import { KEPT } from "./live_track.js";
 
-const SHARE = 0.5; // of the time between pictures that the network may take; slower machines play slower
+const SHARE = 0.5; // of the time between pictures that networks may take, all of a page; slower machines play slower
 
 /** Time that asks the network for frames as it passes. */
 class LiveClock extends Clock {
   constructor(dreamer) {
     super(Infinity, dreamer.fps);
     this.dreamer = dreamer;
+    this.asked = 0; // frames, while somebody saw it play
   }
 
   get frame() {
@@ -27,7 +29,10 @@ class LiveClock extends Clock {
 
   tick(seconds) {
     const moved = super.tick(seconds);
-    if (moved) this.hold(1000 * SHARE * seconds);
+    if (moved) {
+      this.asked += seconds * this.fps * this.speed;
+      this.hold((1000 * SHARE * seconds) / Math.max(making(), 1));
+    }
     return moved;
   }
 
