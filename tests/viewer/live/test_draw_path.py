@@ -14,6 +14,7 @@ from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
 import motionlab
 from motionlab.errors import SolverError, ViewerError
+from motionlab.models import Refiner
 from motionlab.paths import Path
 from motionlab.viewer import draw_path
 from motionlab.viewer.live.draw_path_kernel import PathWidget
@@ -102,7 +103,8 @@ class Design:
         self.go_on = threading.Event()
         self.go_on.set()
 
-    def __call__(self, points, speed, start, model, *, seed, watch):
+    def __call__(self, points, speed, start, model, *, seed, watch, refiner=None):
+        self.refiner = refiner
         self.asked.append((np.asarray(points).tolist(), speed, start, seed))
         if speed > 3:
             raise SolverError("Nobody is as fast as that.")
@@ -158,6 +160,19 @@ def test_walk_asks_design_and_shows_each_window(widget, design, clips):
     assert end["error"] == {"curve": 0.7, "drawn": 1.9}
     assert end["whole"]["tracks"][0]["name"].startswith("walk along a line")
     json.dumps(widget.told)  # it goes over the wire
+
+
+def test_a_refiner_is_asked_for_by_a_tick(model, design):
+    refiner = Refiner(model.encoding, model.normalizer, width=8)
+    widget = draw_path(model, design, refiner=refiner)
+    assert [c["name"] for c in widget.content["controls"]][-1] == "refined"
+    for tick, expected in ((1, refiner), (0, None)):
+        press(widget, refined=tick)
+        widget.join()
+        assert design.refiner is expected
+    other = tiny_lstm(tiny_clips("walk_1.2", "stand"))
+    with pytest.raises(ViewerError, match="can't refine"):
+        draw_path(other, design, refiner=refiner)
 
 
 def test_motionlab_design_is_asked_as_it_wants_to_be(model):

@@ -11,6 +11,7 @@ import torch
 from tiny_lstm import tiny_aclstm, tiny_clips, tiny_lstm
 
 from motionlab.errors import ViewerError
+from motionlab.models import Refiner
 from motionlab.viewer import dream
 from motionlab.viewer.live.player import Player
 
@@ -43,6 +44,16 @@ def test_there_is_a_field_for_every_choice_of_generate(box):
     assert fields(box)["Temperature"].value == 0.5  # as the weights ask for
     assert player(box).payload["frames"] == 31  # the start itself and a second
     assert player(box).payload["tracks"][0]["contacts"] is not None
+
+
+def test_a_refiner_is_ticked_off(model):
+    refiner = Refiner(model.encoding, model.normalizer, width=8)
+    chance = torch.Generator().manual_seed(0)
+    refiner.leave.weight.data = torch.randn(refiner.leave.weight.shape, generator=chance)
+    box = dream(model, seconds=1, refiner=refiner)
+    assert player(box).payload["tracks"] != player(dream(model, seconds=1)).payload["tracks"]
+    fields(box)["Refine the feet"].value = False
+    assert player(box).payload["tracks"] == player(dream(model, seconds=1)).payload["tracks"]
 
 
 def test_no_label_is_cut_off(box):

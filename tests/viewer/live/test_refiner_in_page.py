@@ -89,6 +89,13 @@ def test_a_dream_shows_refined_frames_and_goes_on_from_its_own(model, refiner, t
     points = np.array(said["points"])
     assert np.abs(points[:, 0] - track.positions.flatten(1).numpy()).max() < 2e-3
     assert np.abs(points - plain["points"]).max() > 0.01
+    later = {10: {"refined": 0}, 20: {"refined": 1}}  # the reader ticks it off, and on again
+    mixed = asking(model, tmp_path, refiner)("dream", frames=40, change=change, later=later)
+    poses = [np.array(some["points"]) for some in (mixed, said, plain)]
+    off, on, never = (some - np.tile(some[..., :3], some.shape[-1] // 3) for some in poses)
+    np.testing.assert_allclose(off[10:20], never[10:20], atol=1e-9)
+    for frames in (slice(10), slice(20, None)):
+        np.testing.assert_allclose(off[frames], on[frames], atol=1e-9)
 
 
 def test_a_refiner_of_other_features_is_refused(model, refiner, clips):

@@ -13,13 +13,13 @@ export class KernelWalker {
   }
 
   /** As a PageWalker's. */
-  walk({ points, speed, start, seed }, listener) {
+  walk({ points, speed, start, seed, refined }, listener) {
     this.asked = `${Date.now()}-${Math.random()}`; // another view of the widget asks for others
     this.track = null;
     listener.said("The kernel is solving it …");
     return new Promise((resolve, reject) => {
       Object.assign(this, { listener, resolve, reject });
-      this.model.send({ do: "walk", id: this.asked, points, speed, start, seed });
+      this.model.send({ do: "walk", id: this.asked, points, speed, start, seed, refined });
     });
   }
 

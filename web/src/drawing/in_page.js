@@ -18,7 +18,7 @@ export class PageWalker {
   }
 
   /**
-   * Walk along wish.path at wish.speed, from wish.start (-1: what suits the speed), by chance of wish.seed. Tells
+   * Walk along wish.path at wish.speed, from wish.start (-1: what suits the speed), by chance of wish.seed, wish.refined or not. Tells
    * grown(track, share) again and again, and then done({error, notes, finished}); fails with a plain sentence.
    */
   async walk(wish, { said, grown, done }) {
@@ -30,7 +30,7 @@ export class PageWalker {
     await pause();
     const { starts, fps } = this.weights;
     const start = wish.start < 0 ? pickStart(starts, wish.speed, fps) : wish.start;
-    const settings = { ...this.live.settings, speed: wish.speed, seed: wish.seed, start };
+    const settings = { ...this.live.settings, speed: wish.speed, seed: wish.seed, start, refined: wish.refined };
     const walk = new GuidedWalk(this.weights, { ...this.live.look, name: wish.name, label: this.label }, settings, wish.path);
     do {
       walk.reach(SLICE);

@@ -14,7 +14,7 @@ const ENCODINGS = { JointAngles, RootRelative };
 export class Dreamer {
   /**
    * `weights` from weights.js; `look` says how the tracks look (bones, extras, color, ...);
-   * `settings`: start, seed, characters, noise, and what the network's `draw` takes.
+   * `settings`: start, seed, characters, noise, refined if there is a refiner, and what the network's `draw` takes.
    */
   constructor(weights, look, settings) {
     this.network = new NETWORKS[weights.kind](weights.layers, weights.settings);
@@ -68,7 +68,9 @@ export class Dreamer {
 
   /** What is shown of rows that the network drew: it goes on from what it drew itself. */
   refined(rows, characters) {
-    return this.refiner ? this.refiner.refine(rows, characters.map(({ refining }) => refining)) : rows;
+    if (!this.refiner) return rows;
+    const better = this.refiner.refine(rows, characters.map(({ refining }) => refining)); // it must know all that was
+    return this.settings.refined ?? true ? better : rows;
   }
 
   /** The first character begins anew at a place, as frame 0, alone and with all of `seconds` kept. */

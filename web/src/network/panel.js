@@ -41,9 +41,11 @@ export function field(control, starts, change) {
     Object.assign(input, { type: name === "seed" ? "number" : "range", min, max, step });
     input.value = value;
   }
+  if (name === "refined") Object.assign(input, { type: "checkbox", className: "ml-tick", checked: Boolean(value) });
   const tell = () => { shown.textContent = input.type === "range" ? input.value : ""; };
   input.addEventListener("input", () => {
     tell();
+    if (input.type === "checkbox") return change(name, Number(input.checked));
     if (input.value !== "" && input.checkValidity()) change(name, Number(input.value));
   });
   tell();

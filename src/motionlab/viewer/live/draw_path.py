@@ -23,6 +23,7 @@ def draw_path(
     color: str = "RNN",
     caption: str | None = None,
     height: int = 380,
+    refiner: nn.Module | None = None,
 ) -> Any:
     """A board on which a line is drawn, and a character who walks along it.
 
@@ -44,12 +45,14 @@ def draw_path(
     color : a method's name or a colour, of who walks.
     caption : a text below the figure.
     height : of the moving picture, pixels.
+    refiner : a `Refiner` of what the model makes. Who walks is refined unless the reader ticks that off;
+        in a kernel `design` gets it as refiner=.
 
     Raises
     ------
-    ViewerError : a model that can't be led, one without starts, solved paths that are none or are not
+    ViewerError : a model that can't be led, a refiner of other features, one without starts, solved paths that are none or are not
         at the model's rate, or no design in a kernel.
     """
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
-        return draw_path_page.page_figure(model, solved, speed, color, caption, height)
-    return draw_path_kernel.widget(model, design, solved, speed, color, caption, height)
+        return draw_path_page.page_figure(model, solved, speed, color, caption, height, refiner)
+    return draw_path_kernel.widget(model, design, solved, speed, color, caption, height, refiner)

@@ -26,8 +26,8 @@ Design = Callable[..., tuple[Motion, dict]]
 class PathWidget(anywidget.AnyWidget):
     """A board to draw on, and who walks along what is drawn; web/src/drawing/ is the other side.
 
-    The page sends {do: "walk", id, points, speed, start, seed} and {do: "stop"}. It is told, with the
-    same id: {frames, share} after each window, {whole, error, notes, finished} at the end, or {failed}.
+    The page sends {do: "walk", id, points, speed, start, seed, refined} and {do: "stop"}. It is told, with
+    the same id: {frames, share} after each window, {whole, error, notes, finished} at the end, or {failed}.
     """
 
     _esm = STATIC / "widget.js"
@@ -36,11 +36,19 @@ class PathWidget(anywidget.AnyWidget):
     content = traitlets.Dict().tag(sync=True)
     caption = traitlets.Unicode("").tag(sync=True)
 
-    def __init__(self, model: nn.Module, design: Design, color: str, **traits: Any):
+    def __init__(
+        self,
+        model: nn.Module,
+        design: Design,
+        color: str,
+        refiner: nn.Module | None = None,
+        **traits: Any,
+    ):
         self._stopped = threading.Event()
         bundle_path()
         super().__init__(**traits)
         self._model, self._design, self._color = model, design, color
+        self._refiner = refiner
         self._thread: threading.Thread | None = None
         self.on_msg(lambda _widget, message, _buffers: self._asked(message))
 
@@ -82,6 +90,7 @@ class PathWidget(anywidget.AnyWidget):
                 self._model,
                 seed=int(wish.get("seed", 0)),
                 watch=watch,
+                **({"refiner": self._refiner} if wish.get("refined") else {}),
             )
         except KeyboardInterrupt:
             tell(failed="Stopped before there was anything to see.")
@@ -112,6 +121,7 @@ def widget(
     color: str,
     caption: str | None,
     height: int,
+    refiner: nn.Module | None = None,
 ) -> PathWidget:
     """What `draw_path` is in a running kernel. Parameters as there."""
     check_model(model)
@@ -122,5 +132,5 @@ def widget(
         )
     color = check_color(color)
     floor = float(np.median([floor_height(track) for track in sampled(model, color)]))
-    content = content_of(model, solved, speed, height, floor)
-    return PathWidget(model, design, color, content=content, caption=caption or "")
+    content = content_of(model, solved, speed, height, floor, refiner)
+    return PathWidget(model, design, color, refiner, content=content, caption=caption or "")

@@ -30,15 +30,16 @@ def page_figure(
     color: str = "RNN",
     caption: str | None = None,
     height: int = 380,
+    refiner: nn.Module | None = None,
 ) -> NetworkFigure:
     """What `draw_path` is in a built page: no kernel, no server, also from disk. Parameters as there."""
     check_model(model)
     check_known(model)
     color = check_color(color)
-    weights = weights_script(model, name_of(model))
+    weights = weights_script(model, name_of(model), refiner=refiner)
     tracks = sampled(model, color)
     live = live_of(model, weights, tracks, color)
     live |= {"height": height, "settings": PLAIN | getattr(model, "sampling", {})}
-    content = content_of(model, solved, speed, height, live["floor"])
-    content |= {"live": live, "facts": provenance(model, weights)}
+    content = content_of(model, solved, speed, height, live["floor"], refiner)
+    content |= {"live": live, "facts": provenance(model, weights, refiner)}
     return NetworkFigure(content, weights, still_picture(tracks[0]), caption, "path", ROOM)

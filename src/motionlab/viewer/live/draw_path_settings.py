@@ -13,7 +13,8 @@ from ...errors import ViewerError, WayError
 from ...motion import Motion
 from ...paths import Path
 from ..pictures.palette import PATH
-from .dream_settings import Control, check_starts, sampled_tracks
+from .dream_settings import REFINED, Control, check_starts, sampled_tracks
+from .network_weights import check_refiner
 from .player import Track, payload
 
 SPEED = Control("speed", "Speed (m/s)", "Less in sharp bends", 0.4, 4, 0.1, 1.2)
@@ -43,7 +44,12 @@ def sampled(model: nn.Module, color: str) -> list[Track]:
 
 
 def content_of(
-    model: nn.Module, solved: Sequence[Sequence], speed: float, height: int, floor: float
+    model: nn.Module,
+    solved: Sequence[Sequence],
+    speed: float,
+    height: int,
+    floor: float,
+    refiner: nn.Module | None = None,
 ) -> dict[str, Any]:
     """What the figure reads in a page and in a kernel; parameters as of `draw_path`."""
     lowest, highest = SPEED.min, SPEED.max
@@ -53,6 +59,9 @@ def content_of(
         )
     if not isinstance(height, int) or not 120 <= height <= 2000:
         raise ViewerError(f"draw_path: height is {height!r}; give pixels, from 120 to 2000.")
+    if refiner is not None:
+        check_refiner(model, refiner)
+    controls = (START, SEED) if refiner is None else (START, SEED, REFINED)
     names = list(model.start_names)
     known = [_read(number, item, names, model.fps) for number, item in enumerate(solved)]
     if len(known) > MOST:
@@ -62,7 +71,7 @@ def content_of(
         for about, m in known
     ]
     return {
-        "controls": [asdict(SPEED) | {"value": speed}, asdict(START), asdict(SEED)],
+        "controls": [asdict(SPEED) | {"value": speed}, *map(asdict, controls)],
         "starts": names,
         "solved": [about for about, _ in known],
         "walks": payload(tracks, model.fps) if tracks else None,

@@ -38,8 +38,8 @@ def dream(
     color : a method's name or a colour.
     caption : a text below the figure.
     height : of the picture, pixels.
-    refiner : a `Refiner` of what the model makes; what is shown is refined, and the model goes on
-        from what it made itself.
+    refiner : a `Refiner` of what the model makes; what is shown is refined, unless the reader ticks
+        that off, and the model goes on from what it made itself.
 
     Raises
     ------

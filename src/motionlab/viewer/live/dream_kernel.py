@@ -34,7 +34,7 @@ def controls(
     given = {"seconds": seconds, "characters": characters, **getattr(model, "sampling", {})}
     fields = {
         c.name: _field(c, given.get(c.name, c.value), model.start_names)
-        for c in (*controls_of(model), SECONDS)
+        for c in (*controls_of(model, look.get("refiner")), SECONDS)
     }
     said = ipywidgets.Label()
     player = Player(_sampled(model, _values(fields), look), caption=caption or "")
@@ -71,6 +71,8 @@ def _field(control: Control, value: float, starts: Sequence[str]) -> ipywidgets.
         options = [(name, index) for index, name in enumerate(starts)]
         return ipywidgets.Dropdown(options=options, value=int(value), **common)
     span = {"min": control.min, "max": control.max, "step": control.step}
+    if control.name == "refined":
+        return ipywidgets.Checkbox(value=bool(value), **common)
     if control.name == "seed":
         return ipywidgets.BoundedIntText(value=int(value), **span, **common)
     whole = all(float(number).is_integer() for number in (*span.values(), value))
@@ -87,10 +89,9 @@ def _sampled(model: nn.Module, values: dict[str, Any], look: dict[str, Any]) -> 
     values = dict(values)
     frames = max(1, round(values.pop("seconds") * model.fps))
     start, count = values.pop("start"), values.pop("characters")
+    refiner = look["refiner"] if values.pop("refined", True) else None
     state = model.starts[[start] * count]
-    tracks = sampled_tracks(
-        model, state, frames, color=look["color"], refiner=look["refiner"], **values
-    )
+    tracks = sampled_tracks(model, state, frames, color=look["color"], refiner=refiner, **values)
     return payload(
         tracks,
         model.fps,

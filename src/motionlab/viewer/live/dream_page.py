@@ -55,7 +55,7 @@ def page_figure(
         "live": live,
         "starts": list(model.start_names),
         "controls": [
-            asdict(c) | {"value": values.get(c.name, c.value)} for c in controls_of(model)
+            asdict(c) | {"value": values.get(c.name, c.value)} for c in controls_of(model, refiner)
         ],
         "facts": provenance(model, weights, refiner),
     }

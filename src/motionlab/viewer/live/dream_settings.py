@@ -43,13 +43,16 @@ CONTROLS = (
     Control("characters", "Characters", "As many futures of the same start", 1, 6, 1, 1),
     Control("seed", "Seed", "The same seed gives the same motion", 0, 9999, 1, 0),
 )  # fmt: skip
+REFINED = Control("refined", "Refine the feet", "A second network corrects what the first makes, "
+                  "which knows nothing of it", 0, 1, 1, 1)  # fmt: skip
 _OF_EVERY_MODEL = ("start", "characters", "seed")
 
 
-def controls_of(model: nn.Module) -> list[Control]:
-    """Those that a model has a use for: what its `generate` takes decides."""
+def controls_of(model: nn.Module, refiner: nn.Module | None = None) -> list[Control]:
+    """Those that a model has a use for: what its `generate` takes decides; and that of a refiner."""
     takes = inspect.signature(model.generate).parameters
-    return [c for c in CONTROLS if c.name in _OF_EVERY_MODEL or c.name in takes]
+    its = [c for c in CONTROLS if c.name in _OF_EVERY_MODEL or c.name in takes]
+    return its if refiner is None else [*its, REFINED]
 
 
 def check_starts(model: nn.Module) -> None:
