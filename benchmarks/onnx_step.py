@@ -21,7 +21,7 @@ def on_one_thread(network: bytes) -> onnxruntime.InferenceSession:
 
 def bare_steps(model: LstmGmm, n: int) -> Callable[[], np.ndarray]:
     """A job of n frames on one thread, h and C fed back; it gives what the mixture is made of."""
-    session = on_one_thread(_bare(model))
+    session = on_one_thread(bare(model))
 
     def steps() -> np.ndarray:
         row = lambda size: np.zeros((1, size), np.float32)
@@ -35,7 +35,8 @@ def bare_steps(model: LstmGmm, n: int) -> Callable[[], np.ndarray]:
     return steps
 
 
-def _bare(model: LstmGmm) -> bytes:
+def bare(model: LstmGmm) -> bytes:
+    """The network as an ONNX file: of x, h0, c0, h1, c1 (1, ...) each what is said, and the memories after."""
     graph = Graph(half=False)
     below, after = graph.input("x", model.kept), []
     for layer in (model.enter[0], model.enter[2]):
