@@ -15,6 +15,7 @@ from torch import Tensor, nn
 
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
+from .answers import NO_SHARE, log_density, split
 from .checks import check_memory, check_noise, checked_features, checked_start
 from .noise import noise_to_draw, normal
 from .recurrent import Recurrent
@@ -26,7 +27,6 @@ from .through import through
 # value could be made as narrow, and its density as high, as one likes. With 0.1 a contact that the
 # network was sure of and got wrong costs about 200 nats.
 _FLOOR, _CONTACT_FLOOR = 0.01, 0.1
-_NO_SHARE = 1e-12  # a component's part in a density, below which it has none in its slope
 
 
 class Mixture(NamedTuple):
@@ -90,7 +90,7 @@ class _LogProb(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx, slope):
         far, stds, shares = ctx.saved_tensors
-        shares = slope[..., None] * shares.masked_fill(shares < _NO_SHARE, 0)
+        shares = slope[..., None] * shares.masked_fill(shares < NO_SHARE, 0)
         to_means = shares[..., None] * far / stds
         return -to_means, shares, to_means, to_means * far - shares[..., None] / stds
 
@@ -170,7 +170,9 @@ class LstmGmm(Recurrent):
         if features.shape[1] < 2:
             raise ModelError("log_prob needs at least 2 frames: the first one is given.")
         before = None if noise is None else noise[:, :-1]
-        return self(features[:, :-1], before).log_prob(self.normalizer(features[:, 1:]))
+        inputs, outputs, _ = self._heard(features[:, :-1], self.zero_state(len(features)), before)
+        ahead = self.normalizer(features[:, 1:]) - self.skip * inputs
+        return log_density(self._said(outputs), ahead, self.components, self.reach, self.floor)
 
     def loss(self, features: Tensor, noise: Tensor | None = None) -> Tensor:
         """Mean negative log-likelihood a frame (eq. 8), in nats."""
@@ -184,9 +186,16 @@ class LstmGmm(Recurrent):
         And the state after the last of them. noise : as of `forward`. Nothing is checked: this is
         what others are made of.
         """
+        inputs, outputs, after = self._heard(features, state, noise)
+        return self._mixture(outputs, inputs), after
+
+    def _heard(
+        self, features: Tensor, state: State, noise: Tensor | None
+    ) -> tuple[Tensor, Tensor, State]:
+        """What the network saw (batch, frames, kept), its answers (..., width), the state after."""
         if noise is not None:
             features = features + noise * self.normalizer.std
-        inputs = self.normalizer(features)  # (batch, frames, kept)
+        inputs = self.normalizer(features)
         memory = (
             state.hidden.transpose(0, 1).contiguous(),
             state.cell.transpose(0, 1).contiguous(),
@@ -198,18 +207,20 @@ class LstmGmm(Recurrent):
         else:
             outputs, (hidden, cell) = self.lstm(self.enter(inputs), memory)
         after = State(features[:, -1], hidden.transpose(0, 1), cell.transpose(0, 1), state.noise)
-        return self._mixture(outputs, inputs), after  # outputs (batch, frames, width)
+        return inputs, outputs, after
+
+    def _said(self, outputs: Tensor) -> Tensor:
+        """Numbers of any size (..., M (1 + 2 kept)) of answers (..., width): weights, means, deviations."""
+        # densities need more digits than half precision has
+        with torch.autocast(outputs.device.type, enabled=False):
+            return self.leave(outputs.to(self.leave.weight.dtype))
 
     def _mixture(self, outputs: Tensor, inputs: Tensor) -> Mixture:
-        """Numbers of any size (..., width) to weights, means and deviations (eq. 7).
+        """Answers (..., width) to weights, means and deviations (eq. 7).
 
         inputs : (..., kept), the present frame, of which the means keep a share.
         """
-        # densities need more digits than half precision has
-        with torch.autocast(outputs.device.type, enabled=False):
-            numbers = self.leave(outputs.to(self.leave.weight.dtype))
-        weights, gaussians = numbers.split([self.components, 2 * self.components * self.kept], -1)
-        means, log_stds = gaussians.unflatten(-1, (2, self.components, self.kept)).unbind(-3)
+        weights, means, log_stds = split(self._said(outputs), self.components)
         means = self.skip * inputs[..., None, :] + self.reach * means
         return Mixture(weights.log_softmax(-1), means, self.reach * log_stds.exp() + self.floor)
 
