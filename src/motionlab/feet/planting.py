@@ -22,7 +22,7 @@ import torch
 from scipy.ndimage import binary_closing, distance_transform_edt, maximum_filter1d, minimum_filter1d
 from torch import Tensor
 
-from ..ik.turns import shortest_turn, turn_about
+from ..ik.turns import dot, shortest_turn, turn_about
 from ..kinematics import yaw_matrix
 from .flat import STEP, STILL, steps
 
@@ -240,12 +240,16 @@ def _heel_roll(foot: Foot, hip: Tensor, stretch: Tensor) -> tuple[Tensor, Tensor
     length, down = reach.norm(dim=-1), -reach[:, 1]
     lowest = torch.minimum(foot.sole.heights[0] - _DIP - toe[:, 1], down)
     lowest = ((lowest / length).clamp(-1, 1).arcsin() - (down / length).arcsin()).clamp(min=-_ROLL)
+    # From toe to ankle it goes along the axis and round it: still + cos ahead + sin aside.
+    still = -dot(axis, reach, keepdim=True) * axis
+    ahead, base, least = -reach - still, toe + still - hip, 0.1 * dot(reach, reach)
+    aside = torch.linalg.cross(axis, ahead)
     for _ in range(_ROUNDS):  # Newton's method, damped where a turn hardly changes the length
-        arm = -(turn_about(axis, roll) @ reach[..., None])[..., 0]
-        leg = toe + arm - hip
-        length = leg.norm(dim=-1).clamp(min=1e-6)
-        slope = (torch.linalg.cross(axis, arm) * leg).sum(-1) / length
-        step = (stretch - length) * slope / (slope**2 + 0.1 * reach.square().sum(-1))
+        cosine, sine = roll.cos()[:, None], roll.sin()[:, None]
+        leg = base + cosine * ahead + sine * aside
+        length = dot(leg, leg).sqrt().clamp(min=1e-6)
+        slope = dot(cosine * aside - sine * ahead, leg) / length
+        step = (stretch - length) * slope / (slope**2 + least)
         roll = (roll + step).clamp(max=_ROLL).maximum(lowest)
     return roll, stretch - length
 
@@ -342,13 +346,14 @@ def _carried(
 
 def bridged(values: Tensor, known: Tensor) -> Tensor:
     """Values (frames, k), known in some frames (frames,), eased from one to the next elsewhere."""
-    where = known.nonzero()[:, 0]
+    where = np.flatnonzero(known.numpy())
     if len(where) == 0:
         return values
-    frames = torch.arange(len(values))
-    after = torch.searchsorted(where, frames).clamp(max=len(where) - 1)
-    before = (torch.searchsorted(where, frames, right=True) - 1).clamp(min=0)
+    frames = np.arange(len(values))
+    after = np.searchsorted(where, frames).clip(max=len(where) - 1)
+    before = (np.searchsorted(where, frames, side="right") - 1).clip(min=0)
     first, last = where[before], where[after]
-    part = ((frames - first) / (last - first).clamp(min=1)).clamp(0, 1)
-    part = (part**2 * (3 - 2 * part))[:, None].to(values)
-    return values[first] + part * (values[last] - values[first])
+    part = ((frames - first) / (last - first).clip(min=1)).clip(0, 1)
+    part = torch.from_numpy(part**2 * (3 - 2 * part))[:, None].to(values)
+    first, last = (values[torch.from_numpy(of)] for of in (first, last))
+    return first + part * (last - first)

@@ -15,7 +15,8 @@ from ..skeleton import Skeleton
 
 def dot(a: Tensor, b: Tensor, keepdim: bool = False) -> Tensor:
     """Inner products (...) of vectors (..., 3), or (..., 1)."""
-    found = sum(u * v for u, v in zip(a.unbind(-1), b.unbind(-1), strict=True))
+    x, y, z = (a * b).unbind(-1)
+    found = x + y + z
     return found[..., None] if keepdim else found
 
 
@@ -26,7 +27,8 @@ def length(v: Tensor, keepdim: bool = False) -> Tensor:
 
 def product(a: Tensor, b: Tensor) -> Tensor:
     """Matrix products (..., 3, 3)."""
-    return sum(a[..., :, i, None] * b[..., None, i, :] for i in range(3))
+    first, second, third = (a[..., :, i, None] * b[..., None, i, :] for i in range(3))
+    return first + second + third
 
 
 def unit(v: Tensor) -> Tensor:
@@ -72,7 +74,10 @@ def shortest_turn(start: Tensor, end: Tensor) -> Tensor:
 
 def turn_about(axis: Tensor, angle: Tensor) -> Tensor:
     """Rotation (..., 3, 3) by an angle (...) in radians about a unit axis (..., 3)."""
-    return roma.rotvec_to_rotmat(axis * angle[..., None])
+    # Rodrigues: cos + sin [k]x + (1 - cos) k kᵀ. roma makes a quaternion first, in five times the time
+    cosine, sine = angle.cos()[..., None, None], angle.sin()[..., None, None]
+    along = axis[..., :, None] * ((1 - cosine) * axis[..., None, :])
+    return along.addcmul(sine, skew(axis)).addcmul(cosine, torch.eye(3).to(axis))
 
 
 def twist_about(rotation: Tensor, axis: Tensor) -> Tensor:

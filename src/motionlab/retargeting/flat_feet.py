@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from ..feet.flat import flat_pitch, pitch_of, resting
+from ..ik.turns import place
 from ..roles import SIDES
 from ..skeleton import Skeleton
 from .joints_between import settled
@@ -80,7 +81,8 @@ def scaled(
 
     The scale is that of the legs.
     """
-    points, orientations, roles = motion.positions(), motion.orientations(), motion.skeleton.roles
+    points, orientations = place(motion.skeleton, motion.root_positions, motion.rotations)
+    roles = motion.skeleton.roles
     scale = limb_length(skeleton, "leg") / limb_length(motion.skeleton, "leg")
     at = {role: points[:, joint] * scale for role, joint in roles.items()}
     return at, {role: orientations[:, roles[role]] @ turn for role, turn in axes.items()}, scale

@@ -24,9 +24,10 @@ import roma
 import torch
 from torch import Tensor
 
-from ..ik.turns import shortest_turn
+from ..ik.turns import place, shortest_turn
 from ..roles import SIDES
 from ..skeleton import Skeleton
+from .kept_axes import kept
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -78,8 +79,10 @@ def alignment(motion: Motion, target: Skeleton, reference: Motion | None) -> dic
     stance = stance_of(motion, reference)
     if stance is None:
         return _from_motion(motion, target, roles)
-    axes = _from_stance(stance, target, roles)
-    return axes if reference is not None else axes | _contradicted(axes, motion)
+    if reference is None:
+        axes = _from_stance(stance, target, roles)
+        return axes | _contradicted(axes, motion)
+    return kept(reference, (target, *roles), lambda: _from_stance(reference, target, roles))
 
 
 def _contradicted(axes: dict[str, Tensor], motion: Motion) -> dict[str, Tensor]:
@@ -152,9 +155,9 @@ def rising(points: Tensor, skeleton: Skeleton) -> Tensor:
 def limb_length(skeleton: Skeleton, limb: str, sides: Sequence[str] = SIDES) -> float:
     """Length in metres of a limb's two long bones ("arm", "leg"), mean over sides."""
     parts = (f"upper_{limb}", f"lower_{limb}", "foot" if limb == "leg" else "hand")
-    points, roles = skeleton.rest_points, skeleton.roles
-    joints = [[points[roles[f"{side}_{part}"]] for part in parts] for side in sides]
-    return float(sum((b - a).norm() + (c - b).norm() for a, b, c in joints) / len(sides))
+    joints = [[skeleton.roles[f"{side}_{part}"] for part in parts] for side in sides]
+    bones = skeleton.rest_points[torch.tensor(joints)].diff(dim=1)  # (sides, 2, 3)
+    return float(bones.norm(dim=-1).sum() / len(sides))
 
 
 def facing(points: Tensor, skeleton: Skeleton) -> Tensor:
@@ -217,9 +220,9 @@ def _from_stance(stance: Motion, target: Skeleton, roles: list[str]) -> dict[str
     of one body would get axes of its own.
     """
     source = stance.skeleton
-    ahead = facing(stance.positions(), source)
-    orientations = stance.orientations()
-    axes = {role: _mean(orientations[:, source.roles[role]].mT @ ahead) for role in roles}
+    points, orientations = place(source, stance.root_positions, stance.rotations)
+    turned = orientations[:, [source.roles[role] for role in roles]].mT
+    axes = dict(zip(roles, _mean(turned @ facing(points, source)[:, None]), strict=True))
     for side in SIDES:
         turned: dict[str, Tensor] = {}
         for part, child in LIMBS:
@@ -317,7 +320,7 @@ def _lies(points: Tensor, world: Tensor, source: Skeleton, joint: str, child: st
 
 
 def _mean(rotations: Tensor) -> Tensor:
-    """Mean (3, 3) of rotations (frames, 3, 3)."""
+    """Mean (..., 3, 3) of rotations (frames, ..., 3, 3)."""
     return roma.special_procrustes(rotations.mean(0))
 
 
