@@ -121,6 +121,16 @@ def _draw_few(
     return frames, few.after()
 
 
+@torch.no_grad()
+def stepper(model: LstmGmm, start: State, chance: Chance) -> Few:
+    """Characters (batch) who go on from a state, to be drawn frame by frame by whoever steers them.
+
+    In numpy, at full precision; for models on the processor. Normalised units in and out.
+    """
+    start = State(*(part.detach() for part in start))
+    return Few(model, _products(model, "full", True), _seen(model, start), start, chance)
+
+
 def _disturbance(model: LstmGmm, start: State, chance: Chance) -> Tensor:
     """What is added to what the network sees (batch, kept): drawn for all of (batch, dim), as the loop's."""
     return chance.noise * normal(start.frame, chance.generator)[:, model.normalizer.kept]

@@ -89,7 +89,8 @@ class Few:
         number = lambda value: np.array([value], self.seen.dtype)
         self.reach, self.skip = number(model.reach), number(model.skip)
         self.spread = number(chance.temperature * model.reach)
-        self.floor = chance.temperature * model.floor.numpy()
+        self.own_floor = model.floor.numpy()
+        self.floor = chance.temperature * self.own_floor
         self.share = number(chance.memory), number((1 - chance.memory**2) ** 0.5)
         self.sharpness = number(1 / chance.component_temperature)
         # what chance is drawn into, as a tensor and as an array
@@ -98,16 +99,36 @@ class Few:
         self.waits, self.white = self.waiting.numpy(), self.fresh.numpy()
         self.rows = np.arange(len(seen))
 
-    def draw(self) -> np.ndarray:
-        """The next frame (batch, kept)."""
-        said = self.leave(self.hidden[-1])
+    def draw(self, push: np.ndarray | None = None) -> np.ndarray:
+        """The next frame (batch, kept); push (batch, kept) is added to all means before."""
+        self.said, self.before = self.leave(self.hidden[-1]), self.seen
         components, shape = self.parts
-        chosen = self._choose(said[:, :components])
-        gaussians = said[:, components:].reshape(shape)[self.rows, :, chosen]  # (batch, 2, kept)
+        chosen = self._choose(self.said[:, :components])
+        gaussians = self.said[:, components:].reshape(shape)[
+            self.rows, :, chosen
+        ]  # (batch, 2, kept)
         std = np.exp(gaussians[:, 1]) * self.spread + self.floor
         self._next_noise()
         self.seen = self.reach * gaussians[:, 0] + self.skip * self.seen + std * self.noise
+        if push is not None:
+            self.seen += push
         return self.seen
+
+    def log_prob(self) -> np.ndarray:
+        """Log-likelihood (batch,) of the frame that was drawn last: at a temperature of 1, without
+        the push, and without what is the same for all frames."""
+        components, shape = self.parts
+        log_weights = self.said[:, :components]
+        means, log_stds = self.said[:, components:].reshape(shape).swapaxes(0, 1)
+        stds = np.exp(log_stds) * self.reach + self.own_floor
+        far = (self.seen[:, None] - self.reach * means - self.skip * self.before[:, None]) / stds
+        each = log_weights - (far * far / 2 + np.log(stds)).sum(-1)
+        total = lambda rows: np.logaddexp.reduce(rows, axis=1)
+        return total(each) - total(log_weights)
+
+    def calm(self, share: np.ndarray) -> None:
+        """From now on each character (batch, 1) has a share of the temperature that was given."""
+        self.spread, self.floor = self.spread * share, self.floor * share
 
     def _choose(self, log_weights: np.ndarray) -> np.ndarray:
         """One component each, as `sampler.choose` does it, by the logarithm of what that compares."""

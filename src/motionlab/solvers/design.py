@@ -113,7 +113,7 @@ def design_all(
     watch is called as ``watch(number of the path, motion, done)``.
     """
     name = model if isinstance(model, str) else getattr(model, "about", {}).get("name", "")
-    model = _checked(load(model) if isinstance(model, str) else model, refiner)
+    model = checked(load(model) if isinstance(model, str) else model, refiner)
     speed = _speed(speed, paths)
     fastest = fastest_of(model)
     tables = [path.timetable(speed, fastest, model.fps) for path in paths]
@@ -301,10 +301,10 @@ def _notes(record: dict) -> list[str]:
 # -- what is given --------------------------------------------------------------------------------
 
 
-def _checked(model: nn.Module, refiner: nn.Module | None) -> LstmGmm:
+def checked(model: nn.Module, refiner: nn.Module | None) -> LstmGmm:
     if not isinstance(model, LstmGmm) or not isinstance(model.encoding, JointAngles):
         raise SolverError(
-            f"A path is followed by an LstmGmm on JointAngles, such as lstm-gmm-contacts; this is "
+            f"What is steered is an LstmGmm on JointAngles, such as lstm-gmm-contacts; this is "
             f"{type(model).__name__}."
         )
     if refiner is not None and not isinstance(refiner, Refiner):

@@ -27,53 +27,53 @@ SLOW = 0.3  # seconds that averages forget in
 LOOK, LEAST_LOOK = 0.6, 0.5  # seconds ahead, and metres at least, that are aimed at
 TURN, PACE = 0.6, 0.6  # rad/s and m/s that a push adds at most, a frame's share of them
 BEND = 3.0  # rad/s that is asked for at most
+STANDING = 0.3  # m/s; who is slower goes no way
 
 
 @dataclass
-class Steering:
-    """Where characters are on their paths, what they did of late, and what they should do.
+class Going:
+    """Where characters are, and what they did of late.
 
-    curves : the paths; which : (batch,), the path of each character.
     place : (batch, 3), x, z in metres and yaw in radians.
-    arcs : (batch,), metres of path behind them.
     velocity : (batch, 2) m/s over the ground, turn : (batch,) rad/s, slow averages.
     """
 
-    curves: Curves
-    which: Tensor
     fps: float
     place: Tensor
-    arcs: Tensor
     velocity: Tensor
     turn: Tensor
 
     @classmethod
-    def after(
-        cls, curves: Curves, which: Tensor, fps: float, place: Tensor, arcs: Tensor, recent: Tensor
-    ) -> Steering:
+    def of(cls, fps: float, place: Tensor, recent: Tensor) -> Going:
         """From the last steps and turns `recent` (batch, frames, 3) that led to a place."""
         off, speed, turn = recently(recent.double(), fps)
-        going = place[:, 2] + off
+        going = place[:, 2].double() + off
         velocity = speed[:, None] * torch.stack([going.sin(), going.cos()], 1)
-        return cls(curves, which, fps, place.double(), arcs.double(), velocity, turn)
+        return cls(fps, place.double(), velocity, turn)
 
-    def push(self, speed: Tensor) -> tuple[Tensor, Tensor]:
+    def __getitem__(self, rows: Tensor) -> Going:
+        return Going(self.fps, self.place[rows], self.velocity[rows], self.turn[rows])
+
+    def bearing(self) -> Tensor:
+        """Which way (batch,) they go, radians; who stands goes where he faces."""
+        going = torch.atan2(self.velocity[:, 0], self.velocity[:, 1])
+        return torch.where(self.velocity.norm(dim=1) < STANDING, self.place[:, 2], going)
+
+    def bend(self, to: Tensor, speed: Tensor) -> Tensor:
+        """Rad/s (batch,) of the arc of a circle from here, this way, through what is `to` (batch, 2)
+        metres from here, at a speed (batch,)."""
+        off = torch.atan2(to[:, 0], to[:, 1]) - self.bearing()
+        off = torch.remainder(off + torch.pi, 2 * torch.pi) - torch.pi
+        bend = 2 * (off.clamp(-1.5, 1.5)).sin() * speed / to.norm(dim=1).clamp(min=0.2)
+        return bend.clamp(-BEND, BEND)
+
+    def lacking(self, speed: Tensor, bend: Tensor) -> tuple[Tensor, Tensor]:
         """Metres ahead and radians (batch,) that the next frame should have more of.
 
-        speed : (batch,) m/s that is wanted.
+        speed : (batch,) m/s and bend : (batch,) rad/s that are wanted.
         """
-        look = (LOOK * speed).clamp(min=LEAST_LOOK)
-        to = self.curves.at((self.arcs + look)[:, None], self.which)[:, 0] - self.place[:, :2]
-        going = torch.atan2(self.velocity[:, 0], self.velocity[:, 1])
-        slow = self.velocity.norm(dim=1) < 0.3  # who stands goes where he faces
-        going = torch.where(slow, self.place[:, 2], going)
-        off = torch.atan2(to[:, 0], to[:, 1]) - going
-        off = torch.remainder(off + torch.pi, 2 * torch.pi) - torch.pi
-        # the arc of a circle from here, this way, through there
-        bend = 2 * (off.clamp(-1.5, 1.5)).sin() * speed / to.norm(dim=1).clamp(min=0.2)
-        lacking = bend.clamp(-BEND, BEND) - self.turn
         pace = self.velocity.norm(dim=1)
-        turn = (SHARE * lacking).clamp(-TURN, TURN) / self.fps
+        turn = (SHARE * (bend - self.turn)).clamp(-TURN, TURN) / self.fps
         return (SHARE * (speed - pace)).clamp(-PACE, PACE) / self.fps, turn
 
     def move(self, step: Tensor) -> None:
@@ -87,6 +87,46 @@ class Steering:
         keep = 1 / (SLOW * self.fps)
         self.velocity = self.velocity + keep * (self.fps * moved - self.velocity)
         self.turn = self.turn + keep * (self.fps * step[:, 2] - self.turn)
+
+
+@dataclass
+class Steering:
+    """Where characters are on their paths, and what they should do.
+
+    curves : the paths; which : (batch,), the path of each character.
+    going : where they are, and how they go.
+    arcs : (batch,), metres of path behind them.
+    """
+
+    curves: Curves
+    which: Tensor
+    going: Going
+    arcs: Tensor
+
+    @classmethod
+    def after(
+        cls, curves: Curves, which: Tensor, fps: float, place: Tensor, arcs: Tensor, recent: Tensor
+    ) -> Steering:
+        """From the last steps and turns `recent` (batch, frames, 3) that led to a place."""
+        return cls(curves, which, Going.of(fps, place, recent), arcs.double())
+
+    @property
+    def place(self) -> Tensor:
+        return self.going.place
+
+    def push(self, speed: Tensor) -> tuple[Tensor, Tensor]:
+        """Metres ahead and radians (batch,) that the next frame should have more of.
+
+        speed : (batch,) m/s that is wanted.
+        """
+        look = (LOOK * speed).clamp(min=LEAST_LOOK)
+        there = self.curves.at((self.arcs + look)[:, None], self.which)[:, 0]
+        bend = self.going.bend(there - self.place[:, :2], speed)
+        return self.going.lacking(speed, bend)
+
+    def move(self, step: Tensor) -> None:
+        """Go on by a frame's step to the left and ahead, and turn: (batch, 3)."""
+        self.going.move(step)
         self.arcs = self.curves.onward(self.place[:, :2], self.arcs, self.which)
 
 
@@ -130,7 +170,7 @@ def guided(
         # what the timetable wants next, and a share of what is late or early
         due = (arcs[:, t] - last) + 0.1 * (last - steering.arcs)
         last = arcs[:, t]
-        pushes = steering.push((due * steering.fps).clamp(min=0)) if push else ()
+        pushes = steering.push((due * model.fps).clamp(min=0)) if push else ()
         chosen = choose(mixture.log_weights / component_temperature, generator)
         rows = torch.arange(len(chosen))
         mean, deviation = mixture.means[rows, chosen], mixture.stds[rows, chosen]

@@ -16,6 +16,7 @@ beginning, which sees little in four thousand dimensions, and "paper": a few of 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -51,15 +52,17 @@ def solve(
     method: str = "adam",
     steps: int = 60,
     generator: torch.Generator | None = None,
+    enough: Callable[[], bool] = lambda: False,
 ) -> Solved:
     """Descend from a first guess s, d; for each window, the best that was seen.
 
-    So it is never worse than the guess. method : one of `METHODS`; steps : of it.
+    So it is never worse than the guess. method : one of `METHODS`; steps : of it. enough : asked before
+    each step of Adam; it may say that time is up.
     """
     search = _Search(energy, s, d)
     free = search.zero()
     if method == "adam":
-        _adam(search, free, steps)
+        _adam(search, free, steps, enough)
     elif method == "lbfgs":
         _lbfgs(search, free, steps)
     elif method in ("swarm", "paper"):
@@ -123,10 +126,12 @@ def spread(mixture: Mixture, s: Tensor) -> Tensor:
     return mixture.stds.gather(-2, which)[..., 0, :]
 
 
-def _adam(search: _Search, free: Tensor, steps: int) -> None:
+def _adam(search: _Search, free: Tensor, steps: int, enough: Callable[[], bool]) -> None:
     """Written out, since a window's own best must be seen at each step."""
     first, second = torch.zeros_like(free), torch.zeros_like(free)
     for t in range(1, steps + 1):
+        if enough():
+            break
         _, slope = search.slope(free)
         first = torch.lerp(slope, first, PUSH)
         second = torch.lerp(slope.square(), second, SQUARE)

@@ -1,0 +1,110 @@
+"""What is asked of steered characters: a speed and a way, a place, or a path; and what that means now.
+
+A wish is turned into two numbers a frame, a speed over the ground and a bend, in rad/s, that a body
+can do: nobody is asked for more than the data's fastest, nor to turn at a run as fast as at a walk.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from ..paths import Curves
+from .guided import LEAST_LOOK, LOOK, Going
+
+GAIN = 2.0  # rad/s that are asked for a radian off the way
+BEND, SIDEWAYS = 3.0, 5.0  # rad/s, and m/s² across the way, at most
+SLOWED, SHARP = 2.0, 1.0  # m/s at most for who is more than so many radians off his way
+STILL = 0.15  # m/s; who is asked for less is asked to stand
+ON_THE_SPOT, NEAR = 0.5, 0.35  # radians off beyond which, and on to which, who stands turns
+BRAKE, THERE = 1.0, 0.25  # 1/s, speed a metre before a place; m from it, where one stands
+BEHIND = 2.6  # radians off, beyond which left and right are as good: the side that is begun stays
+
+
+def wrapped(angle: Tensor) -> Tensor:
+    """From -π to π."""
+    return torch.remainder(angle + math.pi, 2 * math.pi) - math.pi
+
+
+@dataclass
+class Aim:
+    """Of each character (batch,): what he should do from now on.
+
+    speed : (batch,) m/s; direction : (batch,) radians, 0 is +z, π/2 is +x.
+    target : (batch, 2) metres, x and z, where to go and stand; NaN: none, the direction counts.
+    curves : paths to go along; which : (batch,), the path of each, -1: none; arcs : (batch,), metres
+        of it behind him.
+    lengths : (paths,) metres, where he stands in the end.
+    """
+
+    speed: Tensor
+    direction: Tensor
+    target: Tensor
+    which: Tensor
+    arcs: Tensor
+    curves: Curves | None = None
+    lengths: Tensor | None = None
+
+    @classmethod
+    def none(cls, going: Going) -> Aim:
+        """To go on as they go."""
+        pace, nowhere = going.velocity.norm(dim=1), torch.full_like(going.velocity, torch.nan)
+        nobody = torch.full((len(pace),), -1)
+        return cls(pace, going.bearing(), nowhere, nobody, torch.zeros_like(pace))
+
+    def __getitem__(self, rows: Tensor) -> Aim:
+        each = (self.speed, self.direction, self.target, self.which, self.arcs)
+        return Aim(*(part[rows] for part in each), self.curves, self.lengths)
+
+    def wanted(self, going: Going, ahead: float = 0.0) -> tuple[Tensor, Tensor, Tensor]:
+        """Speed (batch,) m/s, bend (batch,) rad/s, and radians off the way (batch,), as of now.
+
+        going : where the characters are; ahead : seconds since the arcs were true.
+        """
+        speed, way, bend = self._way(going, ahead)
+        off = wrapped(way - going.bearing())
+        begun = going.turn.abs() > 0.2
+        off = torch.where((off.abs() > BEHIND) & begun, off.abs() * going.turn.sign(), off)
+        still = speed < STILL
+        facing = wrapped(way - going.place[:, 2])
+        on_the_spot = facing * (
+            facing.abs() > torch.where(going.turn.abs() > 0.5, NEAR, ON_THE_SPOT)
+        )
+        off = torch.where(still, on_the_spot, off)
+        sharp = (off.abs() > SHARP) & ~still
+        speed = torch.where(sharp, speed.clamp(max=SLOWED), speed)
+        most = (SIDEWAYS / going.velocity.norm(dim=1).clamp(min=0.1)).clamp(max=BEND)
+        bend = torch.where(bend.isnan() | still, GAIN * off, bend)
+        return speed, bend.clamp(-most, most), off
+
+    def _way(self, going: Going, ahead: float) -> tuple[Tensor, Tensor, Tensor]:
+        """Speed, way and, of those on a path, bend (batch,); else NaN."""
+        to = self.target - going.place[:, :2]
+        far = to.norm(dim=1)
+        near = torch.where(far < THERE, 0.0, (BRAKE * far).clamp(min=2 * STILL))
+        aimed = far.isfinite()
+        speed = torch.where(aimed, torch.minimum(self.speed, near), self.speed)
+        way = torch.where(aimed & (far > THERE), torch.atan2(to[:, 0], to[:, 1]), self.direction)
+        bend = torch.full_like(way, torch.nan)
+        led = self.which >= 0
+        if self.curves is not None and led.any():
+            which, arcs = self.which.clamp(min=0), self.arcs + ahead * self.speed
+            left = self.lengths[which] - arcs
+            slow = torch.where(left < THERE, 0.0, (BRAKE * left).clamp(min=2 * STILL))
+            speed = torch.where(led, torch.minimum(speed, slow), speed)
+            look = (LOOK * speed).clamp(min=LEAST_LOOK)
+            there = self.curves.at((arcs + look)[:, None], which)[:, 0] - going.place[:, :2]
+            way = torch.where(led, torch.atan2(there[:, 0], there[:, 1]), way)
+            bend = torch.where(led, going.bend(there, speed), bend)
+        return speed, way, bend
+
+    def onward(self, going: Going) -> None:
+        """Whoever goes along a path has come so far on it."""
+        led = self.which >= 0
+        if self.curves is not None and led.any():
+            which, places = self.which[led], going.place[led, :2]
+            self.arcs = self.arcs.clone()
+            self.arcs[led] = self.curves.onward(places, self.arcs[led], which)

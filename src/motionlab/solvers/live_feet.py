@@ -1,0 +1,85 @@
+"""Behind a steered stream: a refiner, and feet held still, as the frames come."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from ..encodings import JointAngles
+from ..feet.lock_stream import LockStream
+from ..metrics import broken
+from ..models import Refiner
+from ..motion import Motion
+
+
+class Behind:
+    """Frames of characters, corrected as they come.
+
+    Parameters
+    ----------
+    encoding : of the features; fps : of them.
+    frame : (batch, dim), raw units, the frame before the first, which stands at place (batch, 3).
+    refiner : corrects them, or None. Its root stays within its reach of the one it is given.
+    lock : hold toes still while they are in contact; gives frames `late` frames behind.
+    """
+
+    def __init__(
+        self,
+        encoding: JointAngles,
+        frame: Tensor,
+        place: Tensor,
+        refiner: Refiner | None = None,
+        lock: bool = False,
+    ) -> None:
+        self.encoding, self.refiner = encoding, refiner
+        self.state, self.place = None, place.double()
+        self.before = frame if refiner is None else self._refined(frame[:, None])[:, 0]
+        streams = range(len(frame)) if lock else ()
+        self.locks = [LockStream(encoding.skeleton, encoding.fps) for _ in streams]
+        self.waiting = [torch.zeros(0, 4, dtype=torch.bool) for _ in streams]
+        self.late = self.locks[0].ahead if lock else 0
+
+    @torch.no_grad()
+    def go_on(self, frames: Tensor) -> list[Motion]:
+        """Of each character, what is done: frames (batch, n, dim) in raw units, or those before them."""
+        encoding = self.encoding
+        frames = frames if self.refiner is None else self._refined(frames)
+        rows = torch.cat([self.before[:, None], frames], 1)
+        made = [
+            encoding.to_motion(row, place.to(row))[1:]
+            for row, place in zip(rows, self.place, strict=True)
+        ]
+        walked = encoding.root_path(rows, self.place.to(rows))[:, -1]
+        yaw = self.place[:, 2] + frames[..., 2].double().sum(1)
+        self.place = torch.stack([walked[:, 0].double(), walked[:, 2].double(), yaw], 1)
+        self.before = frames[:, -1]
+        return [self._locked(i, motion) for i, motion in enumerate(made)] if self.locks else made
+
+    def finish(self) -> list[Motion | None]:
+        """The frames that wait for what comes next, at the end; None where there are none."""
+        return [self._done(i, *lock.finish()) for i, lock in enumerate(self.locks)]
+
+    def _refined(self, frames: Tensor) -> Tensor:
+        found = []
+        for frame in frames.split(1, 1):  # one at a time is its fastest
+            refined, self.state = self.refiner.refine(frame, self.state)
+            found.append(refined)
+        features = torch.cat(found, 1)
+        return broken.within(self.encoding, features) if broken.knows(self.encoding) else features
+
+    def _locked(self, i: int, motion: Motion) -> Motion | None:
+        self.waiting[i] = torch.cat([self.waiting[i], motion.contacts])
+        self.shape = motion
+        return self._done(
+            i, *self.locks[i].push(motion.root_positions, motion.rotations, motion.contacts)
+        )
+
+    def _done(self, i: int, root: Tensor, rotations: Tensor) -> Motion | None:
+        if not len(root):
+            return None
+        contacts, self.waiting[i] = self.waiting[i].split(
+            [len(root), len(self.waiting[i]) - len(root)]
+        )
+        return replace(self.shape, root_positions=root, rotations=rotations, contacts=contacts)
