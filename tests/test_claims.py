@@ -9,6 +9,7 @@ import aclstm_cases
 import path_cases
 import pytest
 import refiner_cases
+import steering_cases
 import yaml
 
 from experiments.claims import rnn_gan, verdicts
@@ -211,6 +212,7 @@ CASES = [
     *aclstm_cases.CASES,
     *refiner_cases.CASES,
     *path_cases.CASES,
+    *steering_cases.CASES,
 ]  # fmt: skip
 
 

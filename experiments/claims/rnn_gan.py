@@ -288,6 +288,56 @@ def w5(limits: dict, found: dict) -> Verdict:
     return Verdict(PARTLY if some else NOT, numbers)
 
 
+def w6(limits: dict, found: dict) -> Verdict:
+    if found["seeds"] < 20 or found["survival"]["minutes"] < 5:
+        raise Absent("fewer than 20 seeds, or less than 5 minutes of random commands")
+    share, errors, skates, sound = {}, [], [], []
+    walking = lambda name: name.startswith(("45°", "90°", "180°"))
+    for name, its in found["scripts"].items():
+        ours = its["ways"]["futures"]
+        share[name] = _succeeded(limits, its, ours["rows"])
+        sound += [not row["broken frames"] for row in ours["rows"]]
+        middle = ours["summary"]
+        if walking(name):
+            errors.append(_at_most(middle["direction error (°)"], limits["direction"]))
+            skates.append(middle[SKATE])
+        elif its["kind"] == "pace":
+            errors.append(_at_most(middle["speed error"], limits["speed"]))
+    skate = sorted(skates)[len(skates) // 2] / found["free"]["walk"][SKATE]
+    rate = found["speed"]["futures, K 16"]["frames a second"]
+    alive, whole = found["survival"]["alive"], sum(sound) / len(sound)
+    numbers = {f"{name}: succeeded": each for name, each in share.items()} | {
+        "foot skate over free refined samples'": skate, "without broken frames": whole,
+        "alive after random commands": alive, "frames a second": rate,
+        "errors after settling within the limits": f"{sum(errors)} of {len(errors)}",
+    }  # fmt: skip
+    strict = [name for name in share if name.startswith(("45°", "90°"))] + ["faster", "slower"]
+    others = [name for name in share if name.startswith("180°")]
+    others += ["start", "stop", "walk, run, walk"]
+    fast = rate >= limits["fps"]
+    good = all(share[name] >= limits["turns"] for name in strict)
+    good &= all(share[name] >= limits["others"] for name in others)
+    good &= all(errors) and skate <= limits["skate"] and whole >= limits["sound"]
+    if good and fast and alive >= limits["alive"]:
+        return Verdict(REPRODUCED, numbers)
+    main = [n for n in share if n.startswith(("90°", "180°")) or n == "walk, run, walk"]
+    some = fast and all(share[name] >= limits["others"] for name in main)
+    return Verdict(PARTLY if some else NOT, numbers)
+
+
+def _succeeded(limits: dict, its: dict, rows: list[dict]) -> float:
+    """Share of a script's runs that succeed."""
+    if its["kind"] == "stop":
+        return sum(_at_most(row["left (m/s)"], limits["stands"]) for row in rows) / len(rows)
+    latest = its["people's (s)"]["median"] + limits["late"]
+    return sum(_at_most(row["settled (s)"], latest) for row in rows) / len(rows)
+
+
+def _at_most(value: float | None, limit: float) -> bool:
+    """What never came about is None."""
+    return value is not None and value <= limit
+
+
 def w8(limits: dict, found: dict) -> Verdict:
     hop = found["hop (m/s²)"]  # at the last recorded frame, and at the next
     zero, estimated = (hop[state][0] / hop["observed"][0] for state in ("zero", "estimated"))
@@ -334,5 +384,5 @@ RULES = {
     "W1-variety": w1_variety, "W1-variety-memory": w1_variety, "W1-endless": w1_endless, "W1-likeness": w1_likeness,
     "W1-novelty": w1_novelty, "W2-noise": w2_noise, "W2-rate": w2_rate,
     "W2-optimiser": w2_optimiser, "W2-pretraining": w2_pretraining, "W3": w3, "W4": w4,
-    "W4-generator": w4_generator, "W5": w5, "W8": w8, "W10": w10, "W11": w11,
+    "W4-generator": w4_generator, "W5": w5, "W6": w6, "W8": w8, "W10": w10, "W11": w11,
 }  # fmt: skip
