@@ -63,7 +63,7 @@ def test_stages_follow_each_other():
     assert rates[10:15] == pytest.approx([4 / 5, 3 / 5, 2 / 5, 1 / 5, 1 / 3])
     assert rates[20:23] == pytest.approx([2 / 3, 1 / 3, 1 / 3])
     plain = replace(preset, alone=0, behind=0)
-    assert not plain.hybrid and "stage" not in plain.extras((2, 10, 7), 29, torch.Generator())
+    assert not plain.partial and "stage" not in plain.extras((2, 10, 7), 29, torch.Generator())
     assert plain.rate(20) == 1
 
 

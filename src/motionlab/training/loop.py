@@ -82,10 +82,13 @@ def train(
     """
     gpu = accelerator in ("cuda", "gpu") or (accelerator == "auto" and torch.cuda.is_available())
     precision = precision or ("bf16-mixed" if gpu else "32-true")
+    # processes that wait for each other's gradients must know that some never come
+    shares = "ddp_find_unused_parameters_true" if preset.partial and devices * nodes > 1 else "auto"
     try:
         fabric = Fabric(
-            accelerator=accelerator, devices=devices, num_nodes=nodes, precision=precision
-        )
+            accelerator=accelerator, strategy=shares, devices=devices, num_nodes=nodes,
+            precision=precision,
+        )  # fmt: skip
     except (ImportError, RuntimeError, TypeError, ValueError) as error:
         raise TrainingError(f"Can't train on {devices} x {accelerator!r}: {error}") from error
     fabric.launch()

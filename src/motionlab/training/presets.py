@@ -91,6 +91,11 @@ class Preset:
         """The file that a training is for: the weights that were best in validation."""
         return BEST
 
+    @property
+    def partial(self) -> bool:
+        """Whether there are updates in which a part of the network does not learn."""
+        return False
+
     def windows(self, data: Prepared, split: str) -> Windows:
         """Where the windows of a split come from."""
         return Windows(data.clips(split), self.frames)

@@ -85,7 +85,7 @@ class StrnnPreset(Preset):
             )
         if self.quiet < 0 or min(self.alone, self.behind) < 0:
             raise TrainingError(f"quiet, alone and behind must not be negative: {self}.")
-        if self.hybrid and (not self.residual or self.updates <= self.alone + self.behind):
+        if self.partial and (not self.residual or self.updates <= self.alone + self.behind):
             raise TrainingError(
                 f"Of {self.updates} updates the residual network is to have {self.alone} alone and "
                 f"{self.behind} behind the others: there must be such a network (residual), and "
@@ -93,7 +93,7 @@ class StrnnPreset(Preset):
             )
 
     @property
-    def hybrid(self) -> bool:
+    def partial(self) -> bool:
         """Whether it is trained in stages."""
         return self.alone + self.behind > 0
 
@@ -126,7 +126,7 @@ class StrnnPreset(Preset):
             left = max(0.0, 1 - update / self.quiet)
         noise = left * self.noise * torch.randn(shape, generator=generator)
         found = {"noise": noise, "lots": torch.randint(2**31, shape[:1], generator=generator)}
-        return found | ({"stage": torch.full(shape[:1], stage)} if self.hybrid else {})
+        return found | ({"stage": torch.full(shape[:1], stage)} if self.partial else {})
 
     def model(self, data: Prepared) -> Strnn:
         """An untrained network for some data."""
