@@ -151,13 +151,16 @@ async function main(words) {
     return [await opened(ort, bytes, about), about];
   };
   const [run, about] = await open(words[0]);
+  if (about.kind !== "LstmGmm") throw new Error(`${words[0]}: holds an ${about.kind}; this loop is for an LstmGmm.`);
   const start = about.starts.find(({ name }) => name.startsWith(option("--start", "walk")));
+  if (!start) throw new Error(`--start ${option("--start")}: there is none. There are ${about.starts.map(({ name }) => name).join("; ")}.`);
   let rows = frames(run, start, chance(about));
   if (option("--refiner")) rows = refined(...(await open(option("--refiner"))), rows);
   const made = [];
   for await (const pose of poses(about, rows)) if (made.push(pose) >= Number(option("--seconds", 10)) * about.fps) break;
   writeFileSync(words[1], bvh(about, made));
-  console.log(`${words[1]}: ${made.length} frames from '${start.name}'; the root ends at ${made.at(-1).place}`);
+  const [x, , z] = made.at(-1).place;
+  console.log(`${words[1]}: ${made.length} frames from '${start.name}'; it ends ${x.toFixed(1)} m left, ${z.toFixed(1)} m ahead`);
 }
 
 if (globalThis.process?.argv[1]?.endsWith("onnx_walk.mjs")) await main(process.argv.slice(2));

@@ -64,16 +64,14 @@ def turn(x, y, z):
 
 def poses(about, rows):
     """Of each row the root's place (3) and each joint's rotation (joints, 3, 3) in its parent."""
-    mean, (first, last) = (
-        np.array(about["encoding"]["mean_pose"]),
-        about["features"]["slices"]["pose"],
-    )
-    x = z = yaw = 0.0
+    mean, x, z, yaw = np.array(about["encoding"]["mean_pose"]), 0.0, 0.0, 0.0
+    first, last = about["features"]["slices"]["pose"]
     for count, row in enumerate(rows):
         left, ahead, turned, height, tilt_x, tilt_z = map(float, row[:6])
         if count:  # the first frame has made no step
             sine, cosine = np.sin(yaw), np.cos(yaw)
-            x, z = x + left * cosine + ahead * sine, z + ahead * cosine - left * sine
+            x += left * cosine + ahead * sine
+            z += ahead * cosine - left * sine
             yaw += turned
         vectors = row[first:last].reshape(-1, 3).astype(float)
         joints = [rest @ turn(*vector) for rest, vector in zip(mean[1:], vectors, strict=True)]
@@ -123,11 +121,20 @@ if __name__ == "__main__":
     words.add_argument("--seed", type=int, default=0)
     asked = words.parse_args()
     session, about = network(asked.network)
-    start = next(each for each in about["starts"] if each["name"].startswith(asked.start))
+    if about["kind"] != "LstmGmm":
+        raise SystemExit(f"{asked.network}: holds an {about['kind']}; this loop is for an LstmGmm.")
+    starts = [each for each in about["starts"] if each["name"].startswith(asked.start)]
+    if not starts:
+        known = "; ".join(each["name"] for each in about["starts"])
+        raise SystemExit(f"--start {asked.start}: there is none. There are {known}.")
+    start = starts[0]
     rows = frames(session, start, chance(about, asked.seed))
     if asked.refiner:
         rows = refined(*network(asked.refiner), rows)
     made = list(poses(about, islice(rows, round(asked.seconds * about["fps"]))))
     with open(asked.out, "w") as file:
         file.write(bvh(about, made))
-    print(f"{asked.out}: {len(made)} frames from {start['name']!r}; the root ends at {made[-1][0]}")
+    x, _, z = made[-1][0]
+    print(
+        f"{asked.out}: {len(made)} frames from {start['name']!r}; it ends {x:.1f} m left, {z:.1f} m ahead"
+    )

@@ -120,6 +120,11 @@ def test_it_runs_as_a_script_with_nothing_of_ours(files, tmp_path):
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0 and "30 frames from 'walk 1.0 m/s'" in run.stdout, run.stderr
     assert (tmp_path / "walk.bvh").read_text().count("\n") > 100
+    for words, said in ((["--start", "swim"], "There are walk 1.0 m/s; "), ([], "an LstmGmm")):
+        script = [sys.executable, str(EXAMPLES / "onnx_walk.py")]
+        script += [str(files[0 if words else 1]), "other.bvh", *words]
+        run = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True)
+        assert run.returncode == 1 and said in run.stderr and "Traceback" not in run.stderr
 
 
 # -- JavaScript -----------------------------------------------------------------------------------
