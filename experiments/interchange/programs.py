@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "code_version": motionlab.__version__,
         "clips": {motion.name: about(motion) for motion in given},
         "machine": platform.platform(),
-        "seconds": round(time.perf_counter() - begin, 1),
+        "seconds": round(kept.get("seconds", 0) + time.perf_counter() - begin, 1),
     }
     order = lambda rows, of: {each.name: rows[each.name] for each in of if each.name in rows}
     record.write(
@@ -114,7 +114,7 @@ def sent(program: Program, way: str, motion: motionlab.Motion, work: Path) -> di
 
 def trap(what: Trap, program: Program, there: dict[str, str | None], work: Path) -> dict:
     """What a trap's script prints as JSON."""
-    facts = {"program": program.title, "version": program.pin[1]}
+    facts = {"program": program.title, "packages": [*program.pip, *program.npm]}
     if there[program.name] is None:
         return facts | {"installed": False}
     folder = work / "clips" / f"trap-{what.name}"
