@@ -342,9 +342,10 @@ def test_without_scripts_there_is_a_still(browser, page_file):
 def test_without_webgl_it_says_so_and_shows_the_still(browser, page_file):
     window = browser.new_context()
     window.add_init_script(
-        "const get = HTMLCanvasElement.prototype.getContext;"
-        "HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {"
-        "  return kind.startsWith('webgl') ? null : get.call(this, kind, ...rest) }"
+        "for (const { prototype } of [HTMLCanvasElement, OffscreenCanvas]) {"
+        "  const get = prototype.getContext;"
+        "  prototype.getContext = function (kind, ...rest) {"
+        "    return kind.startsWith('webgl') ? null : get.call(this, kind, ...rest) } }"
     )
     visit = check_book.Visit(window, page_file.as_uri())
     visit.page.wait_for_selector("figure img")

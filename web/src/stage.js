@@ -11,22 +11,20 @@ const IDLE = 30_000; // milliseconds without a player in sight, after which the 
 /** The page's stage, for a player who comes into view; null where WebGL is missing. */
 export function sharedStage(player) {
   if (globalThis[SHARED] === undefined || globalThis[SHARED]?.gone) {
-    const machine = graphicsMachine(document.createElement("canvas"));
-    globalThis[SHARED] = machine === null ? null : new Stage(machine);
+    const gl = begin();
+    globalThis[SHARED] = gl && new Stage(gl);
   }
   globalThis[SHARED]?.players.add(player);
   return globalThis[SHARED];
 }
 
 class Stage {
-  constructor(machine) {
-    // Pictures drawn by the processor (no graphics card): spend fewer pixels.
-    this.software = /swiftshader|llvmpipe|software|basic render/i.test(machine);
+  constructor({ canvas, software, ...context }) {
+    this.software = software;
     this.players = new Set(); // who are seen
     this.gone = false; // then there will be another; a browser, too, may take it away
-    const canvas = drawingCanvas();
     canvas.addEventListener("webglcontextlost", () => { this.gone = true; });
-    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, alpha: true, powerPreference: "low-power" });
+    this.renderer = new WebGLRenderer({ canvas, ...context });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene = new Scene();
@@ -102,12 +100,6 @@ class Stage {
   }
 }
 
-/** A canvas to draw on: one whose picture can be handed over, where a browser draws WebGL on such. */
-function drawingCanvas() {
-  const there = globalThis.OffscreenCanvas && graphicsMachine(new OffscreenCanvas(1, 1)) !== null;
-  return there ? new OffscreenCanvas(1, 1) : document.createElement("canvas");
-}
-
 /** Show a picture on a canvas of the page: handed over, which takes less memory than a copy, or copied. */
 function hand(picture, canvas) {
   if (picture.transferToImageBitmap) return canvas.getContext("bitmaprenderer").transferFromImageBitmap(picture.transferToImageBitmap());
@@ -116,12 +108,28 @@ function hand(picture, canvas) {
   brush.drawImage(picture, 0, 0);
 }
 
-/** Name of what draws WebGL on a canvas ("" if the browser keeps it secret), null if nothing does. */
-function graphicsMachine(canvas) {
-  const gl = canvas.getContext("webgl2");
-  if (!gl) return null;
-  const info = gl.getExtension("WEBGL_debug_renderer_info");
-  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
-  gl.getExtension("WEBGL_lose_context")?.loseContext();
-  return name;
+/**
+ * What a renderer draws with: {canvas, context, antialias, software}; null where WebGL is missing. Pictures drawn by
+ * the processor (no graphics card) have to do with fewer pixels. A context costs megabytes: they get the first one.
+ */
+function begin() {
+  const [canvas, context] = started(false) ?? [];
+  if (!context) return null;
+  const info = context.getExtension("WEBGL_debug_renderer_info"); // null if the browser keeps it secret
+  const software = /swiftshader|llvmpipe|software|basic render/i.test(info ? context.getParameter(info.UNMASKED_RENDERER_WEBGL) : "");
+  if (software) return { canvas, context, software };
+  const [smooth, its] = started(true) ?? [canvas, context];
+  if (its !== context) context.getExtension("WEBGL_lose_context")?.loseContext();
+  return { canvas: smooth, context: its, software };
+}
+
+/** A canvas, one whose picture can be handed over if the browser draws on such, and its context; null if it has none. */
+function started(antialias) {
+  const kinds = [() => globalThis.OffscreenCanvas && new OffscreenCanvas(1, 1), () => document.createElement("canvas")];
+  for (const kind of kinds) {
+    const canvas = kind();
+    const context = canvas?.getContext("webgl2", { antialias, alpha: true, depth: true, powerPreference: "low-power" });
+    if (context) return [canvas, context];
+  }
+  return null;
 }
