@@ -40,7 +40,7 @@ CONTROLS = (
             "before: with 0 it trembles, with 0.9 it changes its mind", 0, 0.99, 0.01, 0),
     Control("noise", "Input noise", "Standard deviation of what is added to all that the network "
             "sees", 0, 1, 0.01, 0),
-    Control("characters", "Characters", "As many futures of the same start", 1, 6, 1, 1),
+    Control("characters", "Characters", "As many futures of the same start", 1, 8, 1, 1),
     Control("seed", "Seed", "The same seed gives the same motion", 0, 9999, 1, 0),
 )  # fmt: skip
 REFINED = Control("refined", "Refine the feet", "A second network corrects what the first makes, "
