@@ -1,7 +1,7 @@
 """What was found of a reference, kept for as long as it lives and does not change.
 
-A thousand clips of one rig ask one reference how their joints' axes lie, and it takes a tenth of the
-time that it takes to bring a clip to another body.
+A thousand clips of one rig ask one reference how their joints' axes lie, and to find that is a good
+part of what it costs to bring a short clip to another body.
 """
 
 from __future__ import annotations
