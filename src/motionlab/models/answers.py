@@ -1,10 +1,10 @@
 """The density of a mixture of Gaussians, straight from the numbers that a network answers with.
 
 It is `lstm_gmm.Mixture.log_prob` of `LstmGmm.forward`, which says what is meant, in less time
-(`benchmarks/bench_training_parts.py`). Training asks for little else, and what it asks for is a loss over some ten thousand Gaussians
-of 64 channels each: arithmetic is little, and memory much. So means and deviations are not made
-first: what is needed of them is found in as few walks through memory as will do, and their slope is
-written out, into one piece.
+(`benchmarks/bench_training_parts.py`). Training asks for little else, and what it asks for is a loss
+over some ten thousand Gaussians of 64 channels each: arithmetic is little, and memory much. So means
+and deviations are not made first: what is needed of them is found in as few walks through memory as
+will do, and their slope is written out, into one piece.
 """
 
 from __future__ import annotations
