@@ -282,7 +282,7 @@ def told(times: list[float]) -> dict:
 
 @torch.no_grad()
 def free(model: nn.Module, refiner: nn.Module, begun: dict) -> dict:
-    """Free samples from the same starts, refined and not locked, at the temperature of steered ones."""
+    """Free samples as they ship, from the same starts, refined and not locked."""
     found = {}
     for gait in ("walk", "run"):
         chance = model.sampling | {"generator": torch.Generator().manual_seed(0)}

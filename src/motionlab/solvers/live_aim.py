@@ -15,7 +15,7 @@ from torch import Tensor
 from ..paths import Curves
 from .guided import LEAST_LOOK, LOOK, Going
 
-GAIN = 2.0  # rad/s that are asked for a radian off the way
+GAIN = 3.0  # rad/s that are asked for a radian off the way
 BEND, SIDEWAYS = 3.0, 5.0  # rad/s, and m/s² across the way, at most
 SLOWED, SHARP = 2.0, 1.0  # m/s at most for who is more than so many radians off his way
 STILL = 0.15  # m/s; who is asked for less is asked to stand
