@@ -77,10 +77,11 @@ def test_the_network_s_commands_run(tmp_path, monkeypatch):
     section = README.partition("## A trained network")[2]
     commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", section, re.MULTILINE)
     sample, still, walk, dance, export, prepare, train, *more = map(str.split, commands)
-    tune, again, rival, dancer, game, mended = more
+    tune, again, rival, manifold, dancer, game, mended = more
     # these need data, and minutes or hours
     assert prepare == ["prepare", "locomotion"]
-    assert train[0] == dancer[0] == rival[0] == "train" and rival[1] == "pfnn"
+    assert train[0] == dancer[0] == rival[0] == manifold[0] == "train"
+    assert rival[1] == "pfnn" and manifold[1] == "strnn"
     assert game[:2] == ["train", "refiner-contacts"] and mended[3] == f"{game[-1]}/best.safetensors"
     monkeypatch.chdir(tmp_path)
     assert main(sample) == 0
