@@ -114,18 +114,6 @@ class Few:
             self.seen += push
         return self.seen
 
-    def log_prob(self) -> np.ndarray:
-        """Log-likelihood (batch,) of the frame that was drawn last: at a temperature of 1, without
-        the push, and without what is the same for all frames."""
-        components, shape = self.parts
-        log_weights = self.said[:, :components]
-        means, log_stds = self.said[:, components:].reshape(shape).swapaxes(0, 1)
-        stds = np.exp(log_stds) * self.reach + self.own_floor
-        far = (self.seen[:, None] - self.reach * means - self.skip * self.before[:, None]) / stds
-        each = log_weights - (far * far / 2 + np.log(stds)).sum(-1)
-        total = lambda rows: np.logaddexp.reduce(rows, axis=1)
-        return total(each) - total(log_weights)
-
     def calm(self, share: np.ndarray) -> None:
         """From now on each character (batch, 1) has a share of the temperature that was given."""
         self.spread, self.floor = self.spread * share, self.floor * share
