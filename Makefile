@@ -21,7 +21,7 @@ book: $(environment)
 	$(python) book/build.py
 
 test: $(environment)
-	$(python) -m pytest --numprocesses 2
+	$(python) -m pytest --numprocesses 2 --dist worksteal
 
 lint: $(environment)
 	$(python) -m ruff check .
