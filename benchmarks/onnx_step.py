@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 import numpy as np
-import onnxruntime
 import torch
+
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # too late once it is imported
+import onnxruntime  # noqa: E402
 
 from motionlab.models import LstmGmm
 from motionlab.weights.export.graph import Graph

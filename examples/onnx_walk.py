@@ -9,10 +9,13 @@ Everything is y up, z ahead, x to the left, in metres and radians; the BVH is in
 
 import argparse
 import json
+import os
 from itertools import islice
 
 import numpy as np
-import onnxruntime
+
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # too late once it is imported
+import onnxruntime  # noqa: E402
 
 
 def network(path):

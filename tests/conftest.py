@@ -21,6 +21,8 @@ if DATA:  # some tests run elsewhere
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # torch reads it when it is imported
 
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # a test run is nobody's business
+
 SOURCES = ("accad", "aclstm-cmu", "bandai-actions", "bandai-locomotion", "cmu")
 
 
