@@ -226,7 +226,7 @@ def summary(rows: list[dict]) -> dict:
     return {
         key: float(
             torch.tensor([row[key] for row in rows], dtype=torch.double)
-            .nan_to_num(math.inf)
+            .nan_to_num(math.inf, posinf=math.inf)  # else it would be the largest number
             .median()
         )
         for key in keys
