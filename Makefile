@@ -21,7 +21,7 @@ book: $(environment)
 	$(python) book/build.py
 
 test: $(environment)
-	$(python) -m pytest --numprocesses 2 --dist worksteal
+	$(python) -m pytest --numprocesses 2
 
 lint: $(environment)
 	$(python) -m ruff check .

@@ -71,6 +71,20 @@ def stop_at(monkeypatch, update):
     monkeypatch.setattr(loop, "draw", broken)
 
 
+@pytest.mark.parametrize("name", loop.OPTIMIZERS)
+def test_a_step_does_not_depend_on_how_a_gradient_lies_in_memory(name):
+    """Adam in one walk (fused) does, on a processor; see findings/."""
+    slope, stepped = torch.randn(3, 4, generator=torch.Generator().manual_seed(0)), []
+    for lies in (slope, slope.t().contiguous().t()):
+        weight = torch.nn.Parameter(torch.zeros(3, 4))
+        optimizer = loop.OPTIMIZERS[name]([weight], lr=0.1)
+        for _ in range(3):
+            weight.grad = lies
+            optimizer.step()
+        stepped.append(weight.detach())
+    assert torch.equal(*stepped)
+
+
 def test_golden_curve(train, smoke, tmp_path):
     encoding = JointAngles(Skeleton.canonical(), rotation="6d", contacts=True)
     motions = {split: datasets.load("gaits", split) for split in ("train", "val")}

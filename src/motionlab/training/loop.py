@@ -29,7 +29,7 @@ from .presets import LAST, Preset
 from .windows import Windows
 
 OPTIMIZERS = {
-    "adam": lambda parameters, lr: torch.optim.Adam(parameters, lr, fused=True),  # in one walk
+    "adam": torch.optim.Adam,  # not fused: on a CPU that steps wrongly where a gradient lies transposed
     "rmsprop": torch.optim.RMSprop,
     "sgd": lambda parameters, lr: torch.optim.SGD(parameters, lr, momentum=0.9),
     "adadelta": lambda parameters, lr: torch.optim.Adadelta(parameters, lr, rho=0.95, eps=1e-8),
