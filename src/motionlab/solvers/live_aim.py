@@ -35,8 +35,8 @@ class Aim:
 
     speed : (batch,) m/s; direction : (batch,) radians, 0 is +z, π/2 is +x.
     target : (batch, 2) metres, x and z, where to go and stand; NaN: none, the direction counts.
-    curves : paths to go along; which : (batch,), the path of each, -1: none; arcs : (batch,), metres
-        of it behind him.
+    curves : paths to go along; which : (batch,), the path of each, -1: none.
+    arcs : (batch,), metres of it behind him.
     lengths : (paths,) metres, where he stands in the end.
     """
 

@@ -1,5 +1,7 @@
 """Steering live (RNN-GAN, section 5.3): characters who do what they are asked while they are asked it.
 
+Five frames at a time::
+
     live = LiveControl("lstm-gmm-contacts", "walk", refiner=motionlab.load("refiner-contacts"), lock=True)
     live.steer(speed=1.2, direction=0.0)
     for _ in range(12):
@@ -314,11 +316,9 @@ def _how(
         budget = _whole("budget", budget, 1, 1_000_000)
         futures = min(futures, budget)
         left = budget - futures  # one look more than steps is taken
-        way, steps = (
-            ("futures", steps)
-            if way == "gradient" and left < 2
-            else (way, min(steps, max(left - 1, 1)))
-        )
+        if way == "gradient" and left < 2:
+            way = "futures"
+        steps = min(steps, max(left - 1, 1))
     return How(way, futures, window, steps, chance, seconds, weights or {})
 
 
