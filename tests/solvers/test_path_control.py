@@ -180,6 +180,19 @@ def test_who_begins_again_is_guided(walker, monkeypatch):
     assert pushes[:4] == [False, True, False, True]
 
 
+def test_who_begins_again_goes_on_searching_too(walker, monkeypatch):
+    """Or a late window would be given for one that is in time, and rough."""
+    monkeypatch.setattr(windows, "ROUGH", 0.0)
+    monkeypatch.setattr(windows, "ASTRAY", 0.0)
+    table, looked = STRAIGHT.timetable(1.2, 4.0, 30.0), []
+    for longer in (0, 1):
+        monkeypatch.setattr(windows, "LONGER", longer)
+        (way,) = follow(walker, [STRAIGHT], beginning(walker, [STRAIGHT]), [table], chance=calm(),
+                        **QUICK | {"retries": 1})  # fmt: skip
+        looked.append(way.evaluations / (len(way.features) - 1))
+    assert looked[1] > 1.4 * looked[0]  # both searches of a window are longer
+
+
 def test_better_is_lower_or_whole():
     first = windows.Solved(torch.zeros(3, 1), torch.zeros(3, 1), torch.tensor([1.0, 2, 3]), 1)
     again = windows.Solved(torch.ones(2, 1), torch.ones(2, 1), torch.tensor([9.0, 1]), 1)

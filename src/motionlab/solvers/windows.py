@@ -114,22 +114,27 @@ class Job:
         """Solve a window, and let its first frames stand fast: these."""
         arcs = self._due()
         rows = torch.arange(len(self.which))
-        solved = self._solve(arcs, rows, *self._guess(arcs, rows))
-        for _ in range(LONGER if self.how.method in DESCENTS else 0):
-            rough = rows[self._off(arcs, solved, rows) > ROUGH]
-            if len(rough):
-                further = self._solve(arcs, rough, solved.s[rough], solved.d[rough])
-                solved = _better(solved, further, rough)
+        solved = self._search(arcs, rows, self.how.guide)
         for _ in range(self.how.retries):
             lost = rows[self._astray(arcs, solved, rows)]
             if not len(lost):
                 break
-            again = self._solve(arcs, lost, *self._guess(arcs, lost, push=True))
+            again = self._search(arcs, lost, push=True)
             whole = ~self._astray(arcs, again, lost)
             solved = _better(solved, again, lost, whole)
             for number in self.which[lost].tolist():
                 self.ways[number].retries += 1
         return self._stand_fast(arcs, solved)
+
+    def _search(self, arcs: Tensor, rows: Tensor, push: bool) -> Solved:
+        """From a guess downhill, for some of the batch; who is not near his path goes on."""
+        solved = self._solve(arcs, rows, *self._guess(arcs, rows, push))
+        for _ in range(LONGER if self.how.method in DESCENTS else 0):
+            rough = (self._off(arcs, solved, rows) > ROUGH).nonzero()[:, 0]
+            if len(rough):
+                further = self._solve(arcs, rows[rough], solved.s[rough], solved.d[rough])
+                solved = _better(solved, further, rough)
+        return solved
 
     def leave_off(self) -> None:
         """What is solved and waited for what comes next stands fast as it is."""
@@ -178,12 +183,11 @@ class Job:
         return solved
 
     @torch.no_grad()
-    def _guess(self, arcs: Tensor, rows: Tensor, push: bool | None = None) -> tuple[Tensor, Tensor]:
+    def _guess(self, arcs: Tensor, rows: Tensor, push: bool) -> tuple[Tensor, Tensor]:
         """Of a few samples that of least energy; they begin with the tail of the window before.
 
-        push : whether they are led to the path; None: as the settings say.
+        push : whether they are led to the path.
         """
-        push = self.how.guide if push is None else push
         many = rows.repeat_interleave(self.how.candidates)
         before, place, recent = self.before[many], self.before.place[many], self.recent[many]
         done, where = 0, self.arcs[many]
