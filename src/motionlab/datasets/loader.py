@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -23,7 +23,7 @@ from ..motion import Motion
 from ..retargeting.flat_feet import Stance
 from ..retargeting.stance import stances
 from ..skeleton import Skeleton
-from . import beside, cache, files, locomotion
+from . import cache, files, locomotion
 from .o3de import parse_take
 from .registry import (
     EXAMPLES,
@@ -38,8 +38,6 @@ from .registry import (
 )
 from .report import Report
 from .splits import assign
-
-_MANY = 20_000  # frames to be retargeted that are worth starting another Python
 
 _lock = threading.Lock()
 _threads_before: list[int] = []  # of loads under way; what to go back to is what the first found
@@ -120,43 +118,16 @@ def _from_files(name: str, wanted: Sequence[Clip], download: bool | None) -> lis
     files.get(name, [clip for some in to_parse.values() for clip in some], download)
     with _progress(f"reading {name}", sum(map(len, to_parse.values()))) as bar:
         for label, some in to_parse.items():
-            arrays = cache.pack(_by_two(name, some, prepare, bar))
+            parsed = []
+            for clip, data in files.read(some):
+                parsed.append(prepare(parse(clip, *data)))
+                bar.update()
+            arrays = cache.pack(parsed)
             if some == _cached_together(name)[label]:
                 cache.write(label, some, arrays, process)
             names = [(clip.source, clip.name) for clip in some]
             motions.update(zip(some, cache.unpack(arrays, names), strict=True))
     return [motions[clip] for clip in wanted]
-
-
-def _by_two(
-    name: str, clips: Sequence[Clip], prepare: Callable[[Motion], Motion], bar: tqdm
-) -> list[Motion]:
-    """Clips made ready; every second one by another process, if that is worth its while."""
-
-    def one_by_one(some: Sequence[Clip]) -> Iterator[Motion]:
-        for clip, data in files.read(some):
-            yield prepare(parse(clip, *data))
-            bar.update()
-
-    many = name == LOCOMOTION and sum(clip.frames for clip in clips) >= _MANY
-    if len(clips) < 2 or not many or _threads_before[0] == 1:
-        return [*one_by_one(clips)]
-    with beside.Second(name, clips[1::2]) as second:
-        ours, theirs = [*one_by_one(clips[::2])], second.motions()
-    if theirs is None:
-        theirs = [*one_by_one(clips[1::2])]
-    else:
-        bar.update(len(theirs))
-    both = [*clips]
-    both[::2], both[1::2] = ours, theirs
-    return both
-
-
-@_one_thread()
-def ready(name: str, clips: Sequence[Clip]) -> list[Motion]:
-    """Clips of a data set, read and prepared, whose files are here already (`beside`)."""
-    _, prepare = _process(name, download=False)
-    return [prepare(parse(clip, *data)) for clip, data in files.read(clips)]
 
 
 def _process(name: str, download: bool | None) -> tuple[int, Callable[[Motion], Motion]]:
