@@ -24,18 +24,15 @@ import torch
 from torch import nn
 
 import motionlab
-from motionlab import metrics
-from motionlab.metrics import Interval
 from motionlab.paths import Path as Way
 from motionlab.solvers import design
 from motionlab.training import Prepared
-from motionlab.training.judging import critic
 from motionlab.weights import find
 
 from ..common import record
 from .curves import shapes
 from .following import GAITS, NAME, Solved, finished, kept, made_with, median, row_of, starts
-from .refined_samples import clips_of
+from .refined_samples import Variant, asked, clips_of
 
 LENGTH = 9.0  # m, of each curve
 FREE = "free samples, refined"
@@ -47,7 +44,6 @@ ROWS: dict[str, dict[str, float]] = {
     "near the line by 2 cm": {"path": (0.7 / 2.0) ** 2},
 }  # weights of terms
 ERROR, SKATE = 1.0, 3.0  # cm, cm/s
-CRITICS = 3
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -120,19 +116,9 @@ def free(model: nn.Module, refiner: nn.Module, begun: torch.Tensor) -> list[list
 def accuracy(model: nn.Module, data: Prepared, motions: list[list[torch.Tensor]]) -> dict:
     """Of critics that have seen the first start's motions and every other recorded walk."""
     clips = clips_of(data, "walk", "val")
-    seen, asked = motions[0], [motion for each in motions[1:] for motion in each]
-    shares = [
-        critic(model.encoding, (clips[::2], seen), (clips[1::2], asked), seed)
-        for seed in range(CRITICS)
-    ]
-    real, made = (torch.stack(each).mean(0) for each in zip(*shares, strict=True))
-    ends = [metrics.bootstrap(each.numpy()) for each in (real, made)]
-    value = sum(end.value for end in ends) / 2
-    low, high = (
-        sum((getattr(end, side) - end.value) ** 2 for end in ends) ** 0.5 / 2
-        for side in ("low", "high")
-    )
-    return Interval(value, value - low, value + high, len(real) + len(made))._asdict()
+    seen, others = motions[0], [motion for each in motions[1:] for motion in each]
+    halves = {"val": clips[::2], "test": clips[1::2]}
+    return asked(Variant(model.encoding, halves, [others], [seen]))._asdict()
 
 
 def helps(row: dict, free_samples: dict) -> bool:

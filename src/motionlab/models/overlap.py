@@ -1,11 +1,26 @@
-"""Windows that overlap: what is said of a frame in all of them, averaged."""
+"""Windows that overlap: those of clips, as rows; what is said of a frame in all of them, averaged."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
+
+from .checks import checked_features
+
+
+def rows_of_windows(
+    model: nn.Module, clips: Sequence[Tensor], length: int, step: int
+) -> Iterator[Tensor]:
+    """All windows of each clip (frames, dim) that has one, normalised as rows (windows, length * kept).
+
+    A window begins at every `step` frames. ModelError for what are no features of the model's.
+    """
+    for clip in clips:
+        if len(clip) >= length:
+            rows = model.normalizer(checked_features(model, clip[None])[0])
+            yield rows.unfold(0, length, step).transpose(1, 2).flatten(1)
 
 
 def mean_of_windows(

@@ -18,6 +18,7 @@ from torch import Tensor, nn
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
 from .checks import as_features, check_normalizer, checked_features
+from .overlap import rows_of_windows
 
 
 class Ridge(nn.Module):
@@ -83,11 +84,7 @@ class Ridge(nn.Module):
         inputs, frames = encode * model.kept, encode + predict
         size = inputs + predict * model.kept
         total, products, count = torch.zeros(size), torch.zeros(inputs, size), 0
-        for clip in clips:
-            if len(clip) < frames:
-                continue
-            rows = normalizer(checked_features(model, clip[None])[0])
-            windows = rows.unfold(0, frames, step).transpose(1, 2).flatten(1)
+        for windows in rows_of_windows(model, clips, frames, step):
             total += windows.sum(0)
             products += windows[:, :inputs].T @ windows
             count += len(windows)

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
 from .checks import as_features, check_normalizer, checked_features
-from .overlap import mean_of_windows
+from .overlap import mean_of_windows, rows_of_windows
 
 
 class Wiener(nn.Module):
@@ -67,11 +67,7 @@ class Wiener(nn.Module):
         spread = _spread(model, noise)
         size, count = len(model.mean), 0
         total, products = torch.zeros(size), torch.zeros(size, size)
-        for clip in clips:
-            if len(clip) < frames:
-                continue
-            rows = normalizer(checked_features(model, clip[None])[0])
-            windows = rows.unfold(0, frames, step).transpose(1, 2).flatten(1)
+        for windows in rows_of_windows(model, clips, frames, step):
             total += windows.sum(0)
             products += windows.T @ windows
             count += len(windows)
