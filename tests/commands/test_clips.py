@@ -69,7 +69,7 @@ def test_convert_reads_as_it_is_told(here):
 
 def test_root_motion(here, capsys):
     assert main(["convert", "walk.bvh", "--out", "x.bvh", "--root-motion", "ground"]) == 0
-    said = "21 joints; below a root joint on the floor, for way and heading\n"
+    said = "21 joints; below a root joint on the floor, called Root, for way and heading\n"
     assert said in capsys.readouterr().out
     assert same(read_bvh("x.bvh"), WALK) and "ROOT Root" in (here / "x.bvh").read_text()
     assert main(["convert", "x.bvh", "--out", "z.bvh", "--root-motion", "ground"]) == 0
@@ -224,7 +224,12 @@ def test_a_line_says_that_a_body_was_perhaps_read_wrongly(here, capsys, command)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert main([command, "down.bvh", "--out", "y.bvh"]) == 0
-    assert "y.bvh: head down throughout: read with --up=-y?" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "y.bvh: head down throughout: read with --up=-y?" in said
+    assert said.splitlines()[-1] == (
+        "y.bvh: is written, and perhaps wrong: head down throughout. Unless it is meant so, write it "
+        "again with --up=-y --force"
+    )
 
 
 def test_a_folder_into_itself_is_not_read_twice(here):
@@ -263,16 +268,34 @@ def test_nothing_is_overwritten_unasked(here, capsys, command):
 BAD = {
     "no such file": (["none.bvh", "--out", "x.bvh"], "none.bvh: there is no such file"),
     "no suffix": (["walk.bvh", "--out", "x"], "x: ends in none of .bvh, .glb"),
+    "no suffix, a folder": (
+        ["walk.bvh", "--out", "o/x"],
+        "such as o/x.bvh or o/x/walk.bvh. Folders",
+    ),
     "another suffix": (["walk.bvh", "--out", "x.csv"], "name a file such as x.bvh"),
     "fbx": (
         ["walk.bvh", "--out", "x.fbx"],
         "FBX is never written, as its format is not open; write x.glb",
     ),
-    "no folder": (["walk.bvh", "--out", "none/x.bvh"], "there is no folder none; make it"),
     "empty folder": (["empty", "--out", "x"], "empty: holds no file that can be read"),
     "a folder onto a file": (["clips", "--out", "walk.bvh"], "is a folder, so this must name one"),
     "a folder onto a name": (["clips", "--out", "x.glb"], "is a folder, so this must name one"),
-    "not a motion": (["clips/notes.txt", "--out", "x.bvh"], "notes.txt, line 1"),
+    "not a motion": (
+        ["clips/notes.txt", "--out", "x.bvh"],
+        "notes.txt: .txt files are not read, but",
+    ),
+    "several": (
+        ["walk.bvh", "clips/a.bvh", "--out", "x"],
+        "takes one file, or one folder of files",
+    ),
+    "to": (
+        ["walk.bvh", "--out", "x", "--to", "gbl"],
+        "--to gbl: did you mean glb? There are bvh, glb",
+    ),
+    "root motion": (
+        ["walk.bvh", "--out", "x.bvh", "--root-motion", "floor"],
+        "--root-motion floor: There are ground, in-place, none.",
+    ),
     "fps 0": (["walk.bvh", "--out", "x.bvh", "--fps", "0"], "--fps 0: must be a number above 0"),
     "fps nan": (["walk.bvh", "--out", "x.bvh", "--fps", "nan"], "must be a number above 0"),
     "fps beyond all": (["walk.bvh", "--out", "x.bvh", "--fps", "1e9"], "above 0, 1000 at most"),
@@ -345,6 +368,11 @@ def test_two_files_that_would_be_one(here, capsys):
     assert written(here / "done") == {"more/b.bvh"}
 
 
+def test_a_file_into_a_folder_that_is_not_there_yet(here):
+    assert main(["convert", "walk.bvh", "--out", "new/deep/x.glb"]) == 0
+    assert written(here / "new") == {"deep/x.glb"}
+
+
 def test_a_file_into_a_folder_that_is_there(here):
     (here / "done").mkdir()
     assert main(["convert", "walk.bvh", "--out", "done", "--to", "glb"]) == 0
@@ -381,3 +409,18 @@ def test_formats_that_are_known_to_be_others_are_named(here, capsys):
     (here / "walk.fbx").write_bytes(b"Kaydara FBX Binary")
     assert main(["info", "walk.fbx"]) == 1
     assert "walk.fbx: .fbx files are not read, but .bvh, .amc, .glb or" in capsys.readouterr().err
+    for name, what in (("a.zip", "Unpack it"), ("a.xml", "not read back"), ("README.md", "")):
+        (here / name).write_text("<mujoco/>")
+        for command in (["info", name], ["convert", name, "--out", "x.bvh"]):
+            assert main(command) == 1
+            said = capsys.readouterr().err
+            assert f"{name}: .{name.split('.')[1]} files are not read, but" in said and what in said
+            assert "HIERARCHY" not in said
+    (here / "walk.bvh.bak").write_bytes((here / "walk.bvh").read_bytes())
+    assert main(["info", "walk.bvh.bak"]) == 0  # its name is odd, and it is one
+
+
+def test_a_missing_file_is_told_in_one_way(here, capsys):
+    for command in ("info none.bvh", "look none.bvh", "convert none.bvh --out x.bvh"):
+        assert main(command.split()) == 1
+        assert "none.bvh: there is no such file or folder." in capsys.readouterr().err
