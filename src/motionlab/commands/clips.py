@@ -142,13 +142,10 @@ class Clips(Taken):
             why = f"ends in none of {', '.join(known)}, so it is not known what to write"
             if self.program.title and self.out.suffix:
                 why = f"{self.program.title} opens {', '.join(known)} alone"
-            names = [self.out.with_suffix(suffix)]
+            instead = f"{self.out.with_suffix(suffix)}"
             if not self.out.suffix:  # a folder may be meant
-                names.append(self.out / f"{self.path.stem}{suffix}")
-            raise MotionFileError(
-                f"--out {self.out}: {why}; name a file such as {' or '.join(map(str, names))}. Folders "
-                "are made."
-            )
+                instead += f", or {self.out / self.path.stem}{suffix}: folders are made"
+            raise MotionFileError(f"--out {self.out}: {why}; name a file such as {instead}.")
         return [(self.path, target)]
 
     def _is_there(self, file: Path, target: Path, targets: list[Path]) -> bool:

@@ -144,7 +144,7 @@ class Convert(Brought):
     are read, an .asf file is what they are read by; if left out, it is looked for beside them."""
     rig_axes: bool = False
     """Write BVH as the rig's own BVH file is, as `retarget` does: its unit, axis up, joints, offsets
-    and channels; without, y up and in centimetres, as all that `convert` writes."""
+    and channels; without, y up and in centimetres."""
 
     def run(self) -> None:
         if self.for_ and self.rig_axes:
