@@ -3,7 +3,7 @@
 //     motionlab export lstm-gmm-permissive --onnx
 //     motionlab export refiner-permissive --onnx
 //     npm install onnxruntime-web
-//     node onnx_walk.mjs lstm-gmm-permissive.onnx walk.bvh --refiner refiner-permissive.onnx
+//     node onnx_walk.mjs lstm-gmm-permissive.onnx walk.bvh --refiner refiner-permissive.onnx --seed 0
 //
 // Everything is y up, z ahead, x to the left, in metres and radians; the BVH is in centimetres.
 
@@ -21,7 +21,7 @@ function fields(bytes, wanted) {
     for (let value = 0, shift = 1; ; shift *= 128) {
       const byte = bytes[at++];
       value += (byte & 127) * shift;
-      if (byte < 128) return value;
+      if (!(byte >= 128)) return value; // the end, too
     }
   };
   while (at < bytes.length) {
@@ -50,10 +50,20 @@ export async function opened(ort, bytes, about) {
   };
 }
 
+/** Chance that can be repeated, without end and between 0 and 1: the generator mulberry32. */
+export function mulberry32(seed) {
+  return () => {
+    seed = (seed + 0x6d2b79f5) | 0;
+    let mixed = Math.imul(seed ^ (seed >>> 15), 1 | seed);
+    mixed = (mixed + Math.imul(mixed ^ (mixed >>> 7), 61 | mixed)) ^ mixed;
+    return (((mixed ^ (mixed >>> 14)) >>> 0) + 0.5) / 2 ** 32;
+  };
+}
+
 /** What each frame is drawn with: normal numbers for the pose, Gumbel's for the component. */
-export function* chance({ inputs, sampling }, uniform = Math.random) {
+export function* chance({ inputs, sampling }, uniform = mulberry32(0)) {
   const many = (count, draw) => Array.from({ length: count }, draw);
-  const log = () => Math.log(1 - uniform()); // never of zero
+  const log = () => Math.log(uniform()); // never of zero
   const normal = () => Math.sqrt(-2 * log()) * Math.cos(2 * Math.PI * uniform());
   const keep = sampling.memory;
   for (let noise; ; ) {
@@ -142,25 +152,38 @@ export function bvh({ skeleton, fps }, poses) {
   return ["HIERARCHY", ...lines, "MOTION", `Frames: ${rows.length}`, `Frame Time: ${(1 / fps).toFixed(8)}`, ...rows, ""].join("\n");
 }
 
-async function main(words) {
-  const [{ readFileSync, writeFileSync }, ort] = [await import("node:fs"), await import("onnxruntime-web")];
-  const option = (name, instead) => (words.includes(name) ? words[words.indexOf(name) + 1] : instead);
-  const open = async (path) => {
-    const bytes = readFileSync(path);
-    const about = readAbout(bytes);
-    return [await opened(ort, bytes, about), about];
+const USAGE = "node onnx_walk.mjs NETWORK.onnx OUT.bvh [--refiner REFINER.onnx] [--seconds 10] [--start walk] [--seed 0]";
+
+async function main(args) {
+  const [{ existsSync, readFileSync, writeFileSync }, { dirname }, { parseArgs }] = await Promise.all(["fs", "path", "util"].map((name) => import(`node:${name}`)));
+  const wrong = (said) => { throw new Error(said); };
+  const instead = { refiner: "", seconds: "10", start: "walk", seed: "0" };
+  const options = Object.fromEntries(Object.entries(instead).map(([name, value]) => [name, { type: "string", default: value }]));
+  const { values: asked, positionals: [path, out] } = parseArgs({ args, options, allowPositionals: true });
+  if (!out) wrong(USAGE);
+  if (!existsSync(dirname(out))) wrong(`${out}: there is no such folder; make it.`);
+  if (!/^\d{1,9}$/.test(asked.seed)) wrong(`--seed ${asked.seed}: must be a whole number.`);
+  const told = (file, kind) => {
+    if (!existsSync(file)) wrong(`${file}: there is no such file; motionlab export NAME --onnx makes one.`);
+    let about;
+    try { about = readAbout(readFileSync(file)); } catch { wrong(`${file}: is no file of motionlab export NAME --onnx.`); }
+    return about.kind === kind ? about : wrong(`${file}: holds a network of kind ${about.kind}; ${kind} is wanted here.`);
   };
-  const [run, about] = await open(words[0]);
-  if (about.kind !== "LstmGmm") throw new Error(`${words[0]}: holds an ${about.kind}; this loop is for an LstmGmm.`);
-  const start = about.starts.find(({ name }) => name.startsWith(option("--start", "walk")));
-  if (!start) throw new Error(`--start ${option("--start")}: there is none. There are ${about.starts.map(({ name }) => name).join("; ")}.`);
-  let rows = frames(run, start, chance(about));
-  if (option("--refiner")) rows = refined(...(await open(option("--refiner"))), rows);
+  const [about, its] = [told(path, "LstmGmm"), asked.refiner && told(asked.refiner, "Refiner")];
+  if (its && JSON.stringify(its.features) !== JSON.stringify(about.features)) wrong(`${asked.refiner}: corrects frames of another kind than ${path}.`);
+  const count = Math.round(Number(asked.seconds) * about.fps);
+  if (!(count >= 1 && count < 1e6)) wrong(`--seconds ${asked.seconds}: must be a frame at least, 1/${about.fps}.`);
+  const start = about.starts.find(({ name }) => name.startsWith(asked.start));
+  if (!start) wrong(`--start ${asked.start}: there is none. There are ${about.starts.map(({ name }) => name).join("; ")}.`);
+  const ort = await import("onnxruntime-web").catch(() => wrong("onnxruntime-web is not there: npm install onnxruntime-web"));
+  const run = await opened(ort, readFileSync(path), about);
+  let rows = frames(run, start, chance(about, mulberry32(Number(asked.seed))));
+  if (its) rows = refined(await opened(ort, readFileSync(asked.refiner), its), its, rows);
   const made = [];
-  for await (const pose of poses(about, rows)) if (made.push(pose) >= Number(option("--seconds", 10)) * about.fps) break;
-  writeFileSync(words[1], bvh(about, made));
+  for await (const pose of poses(about, rows)) if (made.push(pose) >= count) break;
+  writeFileSync(out, bvh(about, made));
   const [x, , z] = made.at(-1).place;
-  console.log(`${words[1]}: ${made.length} frames from '${start.name}'; it ends ${x.toFixed(1)} m left, ${z.toFixed(1)} m ahead`);
+  console.log(`${out}: ${made.length} frames from '${start.name}'; it ends ${x.toFixed(1)} m left, ${z.toFixed(1)} m ahead`);
 }
 
-if (globalThis.process?.argv[1]?.endsWith("onnx_walk.mjs")) await main(process.argv.slice(2));
+if (globalThis.process?.argv[1]?.endsWith("onnx_walk.mjs")) await main(process.argv.slice(2)).catch(({ message }) => { console.error(message); process.exitCode = 1; });

@@ -18,10 +18,18 @@ os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # too late once it is impor
 import onnxruntime  # noqa: E402
 
 
-def network(path):
-    """What runs the network, and what the file says about it."""
-    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
-    return session, json.loads(session.get_modelmeta().custom_metadata_map["motionlab"])
+def network(path, kind):
+    """What runs the network, and what the file says about it; kind : LstmGmm or Refiner."""
+    if not os.path.isfile(path):
+        raise SystemExit(f"{path}: there is no such file; motionlab export NAME --onnx makes one.")
+    try:
+        session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+        about = json.loads(session.get_modelmeta().custom_metadata_map["motionlab"])
+    except Exception:  # the runtime has a kind of its own for each fault
+        raise SystemExit(f"{path}: is no file of motionlab export NAME --onnx.") from None
+    if about["kind"] != kind:
+        raise SystemExit(f"{path}: holds a network of kind {about['kind']}; {kind} is wanted here.")
+    return session, about
 
 
 def chance(about, seed):
@@ -123,9 +131,13 @@ if __name__ == "__main__":
     words.add_argument("--start", default="walk", help="how the name of a start begins")
     words.add_argument("--seed", type=int, default=0)
     asked = words.parse_args()
-    session, about = network(asked.network)
-    if about["kind"] != "LstmGmm":
-        raise SystemExit(f"{asked.network}: holds an {about['kind']}; this loop is for an LstmGmm.")
+    if asked.seed < 0:
+        words.error(f"--seed {asked.seed}: must be 0 or more.")
+    if not os.path.isdir(os.path.dirname(asked.out) or "."):
+        raise SystemExit(f"{asked.out}: there is no such folder; make it.")
+    session, about = network(asked.network, "LstmGmm")
+    if not 1 <= asked.seconds * about["fps"] < 1e6:
+        words.error(f"--seconds {asked.seconds:g}: must be a frame at least, 1/{about['fps']:g}.")
     starts = [each for each in about["starts"] if each["name"].startswith(asked.start)]
     if not starts:
         known = "; ".join(each["name"] for each in about["starts"])
@@ -133,7 +145,12 @@ if __name__ == "__main__":
     start = starts[0]
     rows = frames(session, start, chance(about, asked.seed))
     if asked.refiner:
-        rows = refined(*network(asked.refiner), rows)
+        refiner, its = network(asked.refiner, "Refiner")
+        if its["features"] != about["features"]:
+            raise SystemExit(
+                f"{asked.refiner}: corrects frames of another kind than {asked.network}."
+            )
+        rows = refined(refiner, its, rows)
     made = list(poses(about, islice(rows, round(asked.seconds * about["fps"]))))
     with open(asked.out, "w") as file:
         file.write(bvh(about, made))

@@ -9,10 +9,12 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import tyro
-from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
+from tyro.conf import DisallowNone, OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from .commands.clean import Clean
 from .commands.convert import Convert, Retarget
@@ -215,14 +217,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    command = tyro.cli(
-        OmitSubcommandPrefixes[COMMANDS],
+    words = _downward(sys.argv[1:] if arguments is None else arguments)
+    read = partial(
+        tyro.cli,
+        OmitSubcommandPrefixes[DisallowNone[COMMANDS]],
         prog="motionlab",
-        args=_downward(sys.argv[1:] if arguments is None else arguments),
+        args=words,
         description="Motion data and models.",
     )
+    command, others = read(return_unknown_args=True)
+    files = [word for word in others if Path(word).exists()]
+    if others and not (hasattr(command, "path") and files == others):
+        read()  # which says what is wrong, and exits
     rate = "--fps" if hasattr(command, "folder") else "--file-fps"  # that of files which are read
     try:
+        if files:
+            raise MotionLabError(
+                f"{words[0]} {command.path} {' '.join(files)}: takes one file, or one folder of files; "
+                "put these into a folder and name that."
+            )
         with _plain_warnings(rate):
             command.run()
         sys.stdout.flush()

@@ -127,6 +127,7 @@ def test_what_it_can_not_do(walk, tmp_path, capsys):
         describe(walk, roles={"head": "Kopf"})
     (tmp_path / "empty").mkdir()
     for wrong, said in (
+        (["info", str(walk.with_name("none.bvh"))], "there is no such file or folder"),
         (["info", str(tmp_path / "empty")], "holds no .bvh, .amc, .glb or .gltf file"),
         (["info", str(walk), "--units", "ells"], "Unknown unit 'ells'"),
         (["info", str(walk), "--roles", "none.toml"], "can't be opened"),

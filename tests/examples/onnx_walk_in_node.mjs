@@ -34,4 +34,5 @@ for (const { noise, gumbel } of walk.chance(about, uniform)) {
   drawn.gumbel.push(...gumbel);
   if (drawn.noise.length > 50000) break;
 }
-console.log(JSON.stringify({ bvh: walk.bvh(about, made), apart, drawn }));
+const seeded = [0, 0, 1].map(walk.mulberry32).map((uniform) => [uniform(), uniform(), uniform()]);
+console.log(JSON.stringify({ bvh: walk.bvh(about, made), apart, drawn, seeded }));

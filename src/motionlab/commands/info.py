@@ -18,7 +18,7 @@ from ..io.bvh_units import foot_to_head
 from ..io.motion_file import ENDINGS, is_motion, read_motion
 from ..io.readings import ByFile, Readings
 from ..roles import ALL
-from .folder import Taken
+from .folder import Taken, check_there
 from .options import as_options
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class Info(Taken):
     """A .bvh, .amc, .glb or .gltf file, or a folder of them."""
 
     def run(self) -> None:
+        check_there(self.path)
         print(_described(self.path, self.how(), self.answers(), as_options))
 
 

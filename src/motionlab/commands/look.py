@@ -7,10 +7,12 @@ from pathlib import Path
 
 from ..io.bvh_reading import Doubts, Reading
 from ..motion import Motion
+from .choices import shown_first
 from .clips import Clips
 from .options import as_options
 
 
+@shown_first("path", "out", "height", "open")
 @dataclass(kw_only=True)
 class Look(Clips):
     """A page that plays a file of motion; it opens in a browser, from disk, without a network."""

@@ -17,7 +17,7 @@ from ..motion import Motion
 from ..retargeting.flat_feet import Stance
 from ..retargeting.onto_rig import onto_rig
 from ..skeleton import Skeleton
-from .clips import write
+from .clips import about_root, write
 from .folder import Files
 from .options import as_options
 from .programs import ANY, Program
@@ -84,16 +84,16 @@ class Rig:
         """Write a motion that was brought to the rig, and what to say of its axes and unit."""
         units, up = self.rig_units or "cm", self.rig_up or "y"
         if self._like is None or path.suffix.lower() != ".bvh":
-            write(motion, path, root_motion, program)
-            return []
+            return write(motion, path, root_motion, program)
         if self.rig_axes:
             write_bvh(motion, path, units=units, up=up, like=self._like, root_motion=root_motion)
-            return [f"as the rig's file is: {up} up, units {units}"]
-        write(motion, path, root_motion, program)
+            said = f"as the rig's file is: {up} up, units {units}"
+            return [said, *about_root(root_motion, motion.skeleton.names)]
+        said = write(motion, path, root_motion, program)
         if (units, up) == (program.units, program.up):
-            return []
+            return said
         unit = {"cm": "centimetres", "m": "metres"}[program.units]
-        return [f"unlike the rig's file, {program.up} up and in {unit}"]
+        return [f"unlike the rig's file, {program.up} up and in {unit}", *said]
 
 
 def _of_the_rig(text: str) -> str:

@@ -8,12 +8,12 @@ import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from ..errors import MotionLabError, TrainingError
-from ..io.root_motion import KINDS
+from .choices import RootMotion, way_of
 from .clips import check_no_fbx
 from .programs import ANY
 from .rig import Rig, brought_onto
@@ -59,15 +59,16 @@ class Sample(Rig):
     """Hold toes still while they are in contact: as the network says, or else while they are slow."""
     skeleton: Annotated[str | None, arg(metavar="RIG|canonical")] = None
     """Bring the motion to this rig: a file in which a person stands, at rest or in a frame."""
-    root_motion: Literal[KINDS] | None = None
+    root_motion: RootMotion = None
     """ground: a root joint on the floor carries way and heading, as game engines want; in-place:
-    these are left out."""
+    these are left out; none, as if left out: they stay with the body."""
 
     def run(self) -> None:
         import torch
 
         from ..weights import load
 
+        root_motion = way_of(self.root_motion)
         rig = None if self.skeleton is None else self.find_rig(self.skeleton)
         model = load(self.model)
         check_generates(model, self.model)
@@ -102,7 +103,7 @@ class Sample(Rig):
             said = []
             if self.skeleton is not None:
                 motion, said = brought_onto(motion, rig)
-            said += self.write(motion, path, self.root_motion)
+            said += self.write(motion, path, root_motion)
             about = f"{motion.seconds:.1f} s from {model.start_names[start]!r}"
             print(f"{path}: {'; '.join([about, *said])}")
 

@@ -29,8 +29,8 @@ from .bvh_reading import Doubts, Reading, parse, read
 from .bvh_units import in_metres
 from .bvh_up import check_up, turn_back, turned_back, vertical
 from .euler import to_euler
-from .free_names import free_name, safe_names
-from .root_motion import NAME, Parts, check_kind
+from .free_names import safe_names
+from .root_motion import Parts, check_kind, root_name
 from .root_motion import split as split_root
 
 
@@ -151,7 +151,7 @@ def write_bvh(
         raise BvhError(f"{path}: is there already; pass overwrite=True to replace it.")
     if like is not None and names != "kept":
         raise BvhError(f"{path}: names can't be safe and as in {like}; leave names= or like= out.")
-    words = _words(motion.skeleton.names, names, path)
+    words = file_names(motion.skeleton.names, names, path)
     check_kind(root_motion)
     check_up(up)
     parts = None if root_motion is None else split_root(motion)
@@ -167,7 +167,7 @@ def write_bvh(
             else:
                 whole.write_text(header.text(motion, scale), encoding="utf-8")
             if root_motion == "ground":
-                _put_on_root(whole, free_name(words, NAME), parts, scale, up)
+                _put_on_root(whole, root_name(words), parts, scale, up)
             os.replace(whole, path)
     except OSError as error:
         raise BvhError(
@@ -179,8 +179,8 @@ def write_bvh(
         ) from error
 
 
-def _words(names: Sequence[str], how: str, path: Path) -> list[str]:
-    """Names as a BVH file can have them, "kept" or "safe"."""
+def file_names(names: Sequence[str], how: str, path: Path) -> list[str]:
+    """Joints' names as a BVH file has them, how : "kept" or "safe"; raises BvhError if it can't."""
     if how not in ("kept", "safe"):
         raise BvhError(f"{path}: names={how!r} is not known; use 'kept' or 'safe'.")
     if how == "safe":

@@ -6,9 +6,14 @@ import re
 from collections.abc import Sequence
 
 
+def alike(name: str, other: str) -> bool:
+    """Whether programs to which root and Root are one name take them for one."""
+    return name.casefold() == other.casefold()
+
+
 def free_name(names: Sequence[str], name: str) -> str:
-    """A name, with Motion behind it if it is one of these."""
-    while name in names:
+    """A name, with Motion behind it if it is one of these, in capitals or not."""
+    while any(alike(name, taken) for taken in names):
         name += "Motion"
     return name
 

@@ -28,7 +28,7 @@ from .bvh_reading import Reading
 from .free_names import free_name
 from .gltf_mesh import Skin, bind_pose, mannequin
 from .gltf_reading import read
-from .root_motion import NAME, Parts, check_kind, split
+from .root_motion import Parts, check_kind, root_name, split
 from .whole_file import put_whole
 
 # Codes that glTF took from OpenGL.
@@ -148,9 +148,7 @@ def write_gltf(
     check_kind(root_motion)
     parts = None if root_motion is None else split(motion)
     motion = motion if parts is None else parts.body
-    scene = _Scene(motion, name or motion.name or "motion")
-    if root_motion == "ground":
-        scene.put_on_root()
+    scene = _Scene(motion, name or motion.name or "motion", on_root=root_motion == "ground")
     scene.add_animation(parts)
     scene.add_mannequin(color)
     put_whole(path, scene.content(), GltfError)
@@ -160,10 +158,11 @@ class _Scene:
     """The two halves of a file: `json`, a tree of objects that name each other by index, and
     `buffer`, the arrays that some of them are about."""
 
-    def __init__(self, motion: Motion, name: str):
+    def __init__(self, motion: Motion, name: str, *, on_root: bool):
         points = motion.skeleton.point_names
-        self.motion, self.name = motion, free_name(points, name)
-        self.body = free_name(points, f"{self.name}_body")
+        taken = [*points, root_name(points)] if on_root else points
+        self.motion, self.name = motion, free_name(taken, name)
+        self.body = free_name(taken, f"{self.name}_body")
         self.root: int | None = None  # the node of a root joint on the floor, if there is one
         self.bound = bind_pose(motion)
         self.buffer = bytearray()
@@ -175,6 +174,8 @@ class _Scene:
             "bufferViews": [],
             "accessors": [],
         }
+        if on_root:
+            self._put_on_root()
 
     def _nodes(self) -> list[dict]:
         """A node per point, in the order of the points, in the bind pose."""
@@ -193,14 +194,14 @@ class _Scene:
                 nodes[parent].setdefault("children", []).append(point)
         return nodes
 
-    def put_on_root(self) -> None:
+    def _put_on_root(self) -> None:
         """Hang the body on one more joint, which carries way and heading.
 
         It is in the skin, too, so that programs that look for bones there find it.
         """
         self.root = len(self.json["nodes"])
-        taken = [*self.motion.skeleton.point_names, self.name, self.body]
-        self.json["nodes"].append({"name": free_name(taken, NAME), "children": [0]})
+        name = root_name(self.motion.skeleton.point_names)
+        self.json["nodes"].append({"name": name, "children": [0]})
         self.json["scenes"][0]["nodes"] = [self.root]
 
     def add_animation(self, parts: Parts | None) -> None:

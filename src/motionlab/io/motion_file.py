@@ -17,19 +17,17 @@ _READERS = {
     ".gltf": gltf_reading.read,
 }
 SUFFIXES = tuple(_READERS)
-_OTHERS = (
-    ".fbx",
-    ".c3d",
-    ".dae",
-    ".usd",
-    ".usda",
-    ".usdc",
-    ".usdz",
-    ".vmd",
-    ".trc",
-    ".npz",
-    ".blend",
+_BLENDER = "Blender opens most others: import it there and export glTF (.glb)."
+_USD = (
+    f"What motionlab writes as USD it does not read back: keep the clip it was made of. {_BLENDER}"
 )
+_OTHERS = {
+    **dict.fromkeys((".fbx", ".c3d", ".dae", ".vmd", ".trc", ".npz", ".blend"), _BLENDER),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _USD),
+    **dict.fromkeys((".zip", ".7z", ".rar", ".tar", ".gz"), "Unpack it, and name the folder."),
+    ".xml": "Models of MuJoCo are written, but not read back: keep the clip it was made of.",
+}  # what to do with a file of a format that is known not to be read
+_BEGINNING = 4096  # bytes, in which a BVH file says HIERARCHY, comments before it and all
 ENDINGS = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"  # in words
 
 
@@ -54,8 +52,8 @@ def read_rig(path: str | os.PathLike, how: Reading) -> tuple[Motion, Doubts]:
 
 
 def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tuple[Motion, Doubts]:
-    """The motion in a file, and what to warn of; what ends in none of `SUFFIXES` is read as BVH, but
-    for formats that are known to be other ones.
+    """The motion in a file, and what to warn of; what ends in none of `SUFFIXES` is read as BVH if it
+    begins so.
 
     Raises
     ------
@@ -64,9 +62,17 @@ def read_motion(path: str | os.PathLike, how: Reading, source: str = "") -> tupl
     ending = Path(path).suffix.lower() if isinstance(path, str | os.PathLike) else ""
     if ending == ".asf":  # which is half a motion, as its reader says
         return acclaim.read(path, how, source)
-    if ending in _OTHERS:
-        raise MotionFileError(
-            f"{path}: {ending} files are not read, but {ENDINGS} are. Blender opens most others: import "
-            "it there and export glTF (.glb)."
-        )
+    if ending in _OTHERS or (ending and ending not in _READERS and not _begins_as_bvh(path)):
+        said = f"{path}: {ending} files are not read, but {ENDINGS} are."
+        raise MotionFileError(" ".join([said, *filter(None, [_OTHERS.get(ending)])]))
     return _READERS.get(ending, bvh_reading.read)(path, how, source)
+
+
+def _begins_as_bvh(path: str | os.PathLike) -> bool:
+    """Whether a file with a strange ending is BVH all the same, or can't be opened, as its reader says."""
+    try:
+        with open(path, "rb") as file:
+            beginning = file.read(_BEGINNING)
+    except (OSError, ValueError):
+        return True
+    return b"HIERARCHY" in beginning.replace(b"\0", b"").upper()  # UTF-16, too

@@ -12,6 +12,7 @@ shoulders together do, which turn against each other in every step: it sways hal
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,11 +23,17 @@ from ..errors import MotionError
 from ..kinematics import heading, yaw_matrix
 from ..motion import Motion
 from ..retargeting.rest_alignment import frame
+from .free_names import free_name
 
 KINDS = ("in-place", "ground")
 NAME = "Root"
 _FLAT = torch.tensor([1.0, 0.0, 1.0])
 _LINES = ("upper_leg", "upper_arm")
+
+
+def root_name(names: Sequence[str]) -> str:
+    """What a root joint above joints of these names is called."""
+    return free_name(names, NAME)
 
 
 class Parts(NamedTuple):

@@ -121,9 +121,14 @@ def write_usd(motion: Motion, path: str | os.PathLike) -> None:
     put_whole(path, text.encode())
 
 
+def joint_names(skeleton: Skeleton) -> list[str]:
+    """What joints and, behind them, end sites are called in the file."""
+    return safe_names(skeleton.point_names, ascii_only=True)
+
+
 def _joint_paths(skeleton: Skeleton) -> list[str]:
     """Hips, Hips/Spine, ...: a joint with all that it hangs on; end sites behind the joints."""
-    names = safe_names(skeleton.point_names, ascii_only=True)
+    names = joint_names(skeleton)
     paths: list[str] = []
     for name, parent in zip(names, skeleton.point_parents, strict=True):
         paths.append(name if parent < 0 else f"{paths[parent]}/{name}")

@@ -156,5 +156,6 @@ def _load(path: str | os.PathLike) -> tuple[dict[str, Tensor], dict]:
         raise TrainingError(f"{path}: there is no such file.") from error
     except (OSError, KeyError, ValueError, safetensors.SafetensorError) as error:
         raise TrainingError(
-            f"{path}: is damaged, or not a file of motionlab's ({error}); remove it or name another."
+            f"{path}: is no file of weights that motionlab wrote, or a damaged one ({error}); name "
+            "another."
         ) from error
