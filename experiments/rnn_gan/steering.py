@@ -148,10 +148,12 @@ def beginnings(model: nn.Module, data: Prepared, gait: str, split: str):
 
 
 def begin_from(model: nn.Module, begun) -> None:
-    """States (BEGINS,) are the model's first starts; the last is its own stand, which tells how to."""
-    stand = model.starts[[model.start_names.index("stand")]]
-    model.starts = type(begun)(*(torch.cat(both) for both in zip(begun, stand, strict=True)))
-    model.start_names = (*(f"start {i}" for i in range(BEGINS)), "stand")
+    """States (BEGINS,) are the model's first starts, its own come behind them."""
+    own = [i for i, name in enumerate(model.start_names) if not name.startswith("start ")]
+    both = zip(begun, model.starts[own], strict=True)
+    names = [model.start_names[i] for i in own]
+    model.starts = type(begun)(*map(torch.cat, both))
+    model.start_names = (*(f"start {i}" for i in range(BEGINS)), *names)
 
 
 # -- scripts ----------------------------------------------------------------------------------------
