@@ -1,7 +1,7 @@
 """Results made up for the rule of W6: it can say yes, and no."""
 
 SCRIPTS = {
-    **{f"{d}° {side}": "turn" for d in (45, 90, 180) for side in ("left", "right")},
+    **{f"{d}° {side}": "turn" for d in (45, 90, 179) for side in ("left", "right")},
     "faster": "pace", "slower": "pace", "walk, run, walk": "pace", "start": "pace", "stop": "stop",
     "slalom": "turn", "run, 90° left": "turn",
 }  # fmt: skip
@@ -19,7 +19,7 @@ def steering(settled=1.5, left=0.05, error=5.0, pace=0.05, skate=6.0, alive=1.0,
         scripts[name] = {"kind": kind, "ways": {"futures": ours}, "people's (s)": {"median": 1.0}}
     return {
         "seeds": seeds, "scripts": scripts, "free": {"walk": {"foot skate (cm/s)": 5.0}},
-        "survival": {"alive": alive, "minutes": 5.0},
+        "survival": {"alive": alive, "minutes": 5.0, "astray": 0},
         "speed": {"futures, K 16": {"frames a second": fps}},
     }  # fmt: skip
 
@@ -34,7 +34,7 @@ CASES = [
     ("W6", "partly", steering(alive=0.9)),
     ("W6", "partly", steering(broken=3)),
     ("W6", "partly", steering(pace=None)),
-    ("W6", "not", steering(late="180° right")),
+    ("W6", "not", steering(late="179° right")),
     ("W6", "not", steering(settled=2.5)),
     ("W6", "not", steering(fps=20.0)),
     ("W6", "open", steering(seeds=5)),

@@ -291,8 +291,10 @@ def w5(limits: dict, found: dict) -> Verdict:
 def w6(limits: dict, found: dict) -> Verdict:
     if found["seeds"] < 20 or found["survival"]["minutes"] < 5:
         raise Absent("fewer than 20 seeds, or less than 5 minutes of random commands")
+    if "astray" not in found["survival"]:
+        raise Absent("measured before who runs away or glides was counted")
     share, errors, skates, sound = {}, [], [], []
-    walking = lambda name: name.startswith(("45°", "90°", "180°"))
+    walking = lambda name: name.startswith(("45°", "90°", "179°"))
     for name, its in found["scripts"].items():
         ours = its["ways"]["futures"]
         share[name] = _succeeded(limits, its, ours["rows"])
@@ -312,7 +314,7 @@ def w6(limits: dict, found: dict) -> Verdict:
         "errors after settling within the limits": f"{sum(errors)} of {len(errors)}",
     }  # fmt: skip
     strict = [name for name in share if name.startswith(("45°", "90°"))] + ["faster", "slower"]
-    others = [name for name in share if name.startswith("180°")]
+    others = [name for name in share if name.startswith("179°")]
     others += ["start", "stop", "walk, run, walk"]
     fast = rate >= limits["fps"]
     good = all(share[name] >= limits["turns"] for name in strict)
@@ -320,7 +322,7 @@ def w6(limits: dict, found: dict) -> Verdict:
     good &= all(errors) and skate <= limits["skate"] and whole >= limits["sound"]
     if good and fast and alive >= limits["alive"]:
         return Verdict(REPRODUCED, numbers)
-    main = [n for n in share if n.startswith(("90°", "180°")) or n == "walk, run, walk"]
+    main = [n for n in share if n.startswith(("90°", "179°")) or n == "walk, run, walk"]
     some = fast and all(share[name] >= limits["others"] for name in main)
     return Verdict(PARTLY if some else NOT, numbers)
 

@@ -14,11 +14,14 @@ import torch
 from torch import Tensor
 
 from motionlab import Motion, metrics
+from motionlab.encodings import JointAngles
+from motionlab.feet.contacts import foot_points
 from motionlab.solvers.live_aim import wrapped
 
 SETTLED = 0.5  # seconds that must be kept
 WITHIN, FACING, SPEED = 10.0, 15.0, 0.1  # degrees of travel, of facing, and share of the speed
 STANDS = 1.5  # seconds after which a stop must stand
+ASTRAY, GLIDES = 0.75, 0.6  # m/s above what is asked, and of a foot that does not rest
 CHORD = 1.0  # seconds
 SLOWEST = 4.0  # seconds; who takes longer does not turn, but walks a curve
 
@@ -102,6 +105,48 @@ def stopped(motion: Motion, frame: int) -> dict[str, float]:
     left = instant[round(STANDS * motion.fps) :]
     calm = first_kept(instant <= 0.1, motion.fps)
     return {"left (m/s)": float(left.mean()), "settled (s)": calm}
+
+
+# -- random commands, and what became of who was given them ----------------------------------------
+
+
+def ends(
+    encoding: JointAngles, features: Tensor, bad: Tensor, asked: Tensor
+) -> tuple[dict[str, Tensor], Tensor]:
+    """Who (characters,) is no body any more, and in what way; and who glides when.
+
+    Parameters
+    ----------
+    features : (characters, frames, dim), raw units; bad : bool (characters, frames), broken poses.
+    asked : (characters, frames) m/s.
+
+    Returns
+    -------
+    "fallen" holds broken poses for half a second; "frozen" moves by less than 0.1 m/s in seconds 3 and
+    4 of four in which 0.5 or more is asked; "astray" goes faster than ever asked in those seconds by
+    `ASTRAY`; "glided" went a second without that any part of its feet rested. And that, bool (characters,
+    seconds).
+    """
+    fps = encoding.fps
+    half, slow = round(fps / 2), round(2 * fps)
+    fallen = bad.double().unfold(1, half, 1).amin(2).amax(1) > 0
+    root = encoding.root_path(features)[..., [0, 2]].diff(dim=1).norm(dim=-1) * fps
+    pace = root.unfold(1, slow, 1).mean(2)[:, slow:]
+    wishes = asked[:, 1:].unfold(1, 2 * slow, 1)[:, : pace.shape[1]]
+    pace = pace[:, : wishes.shape[1]]
+    frozen = ((wishes.amin(2) >= 0.5) & (pace < 0.1)).any(1)
+    astray = (pace > wishes.amax(2) + ASTRAY).any(1)
+    glides = torch.stack([gliding(encoding, each) for each in features])
+    return {"fallen": fallen, "frozen": frozen, "astray": astray, "glided": glides.any(1)}, glides
+
+
+def gliding(encoding: JointAngles, features: Tensor) -> Tensor:
+    """Whether in a second (seconds,) no part of the feet of features (frames, dim) was ever slower
+    than `GLIDES`: no recorded clip of the validation split has one."""
+    fps = encoding.fps
+    feet = encoding.positions(features)[:, foot_points(encoding.skeleton)][..., [0, 2]]
+    slowest = (feet.diff(dim=0).norm(dim=-1) * fps).amin(1)
+    return slowest.unfold(0, round(fps), round(fps)).amin(1) > GLIDES
 
 
 # -- people's own times -----------------------------------------------------------------------------

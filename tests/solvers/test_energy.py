@@ -7,7 +7,7 @@ import torch
 
 from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import SolverError
-from motionlab.feet.contacts import rest_heights
+from motionlab.feet.contacts import foot_points, rest_heights
 from motionlab.models import LstmGmm
 from motionlab.paths import Curves, Path
 from motionlab.solvers import terms
@@ -48,6 +48,7 @@ def wishes(network, window, piece):
         "step length": terms.step_length(0.9, body),
         "contact": terms.contact(body),
         "resting": terms.resting(body, encoding.fps, slower=20.0),
+        "planted": terms.planted(body, encoding.fps),
         "poses": lambda features, *rest: terms.poses(encoding)(5 * features, *rest),
         "places": terms.places(points, [0], seen),
         "channels": terms.channels(angles, encoding.slices["pose"]),
@@ -82,7 +83,7 @@ def test_noise_is_a_gaussian(network, window):
 
 
 NAMES = ["prior", "noise", "path", "hand", "toe", "time", "ahead", "speed", "direction", "turn",
-         "step length", "contact", "resting", "poses", "places",
+         "step length", "contact", "resting", "planted", "poses", "places",
          "channels"]  # fmt: skip
 
 
@@ -204,6 +205,18 @@ def test_contact_costs_what_slides_and_floats(clips):
     assert term(None, positions, contacts).item() == pytest.approx(3 / 2)
     positions[:, 5, body.role("left_toes"), 1] += 0.02
     assert term(None, positions, contacts).item() == pytest.approx(3 / 2 + 2)
+
+
+def test_one_foot_that_stays_is_enough_and_who_has_none_pays_for_his_speed(clips):
+    """The cost of a glide is half the square of its speed in 0.3 m/s, a frame."""
+    body = clips[0].skeleton
+    term = terms.planted(body, 30.0, speed=0.3)
+    points = torch.zeros(3, 5, body.points, 3)
+    points[0, :, :, 0] = torch.arange(5)[:, None] * 0.6 / 30  # glides at 0.6 m/s
+    points[1, :, :, 0] = torch.arange(5)[:, None] * 0.6 / 30
+    points[1, :, foot_points(body)[1], 0] = 0.7  # one toe stays
+    points[2, :, :, 1] = torch.arange(5)[:, None].float()  # rises: no matter of the ground
+    torch.testing.assert_close(term(points, points, None), torch.tensor([4 * 2.0, 0, 0]))
 
 
 def test_what_is_slow_rests_and_what_is_fast_may(clips):

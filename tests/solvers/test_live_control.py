@@ -12,7 +12,7 @@ from motionlab.metrics import broken
 from motionlab.motion import concatenate
 from motionlab.paths import Path
 from motionlab.solvers.guided import Going
-from motionlab.solvers.live_aim import BEND, SIDEWAYS, Aim
+from motionlab.solvers.live_aim import BEND, HURRY, SIDEWAYS, SLOWED, Aim
 from motionlab.solvers.live_control import LiveControl
 from motionlab.solvers.live_feet import Behind
 
@@ -221,8 +221,11 @@ def test_the_aim_turns_the_short_way_and_stays_with_the_side_it_has_begun():
 def test_the_aim_asks_for_what_bodies_can_do():
     assert aimed(going(), 1.2, 3.0)[1] == BEND
     speed, bend, _ = aimed(going(speed=3.0), 3.0, 3.0)
-    assert bend == pytest.approx(SIDEWAYS / 3) and speed == 2.0
+    assert bend == pytest.approx(SIDEWAYS / 3) and speed == SLOWED
     assert aimed(going(speed=3.0), 3.0, 0.2)[0] == 3.0
+    assert aimed(going(speed=1.2), 3.0, 0.0)[0] == pytest.approx(1.2 + HURRY)
+    assert aimed(going(speed=3.0), 0.0, 0.0)[0] == 0.0  # who is asked to stand does not wait
+    assert aimed(going(speed=0.0), 1.2, 0.0)[0] > 0.15
 
 
 def test_who_stands_turns_on_the_spot_only_when_it_is_worth_it():

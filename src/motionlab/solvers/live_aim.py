@@ -17,7 +17,8 @@ from .guided import LEAST_LOOK, LOOK, Going
 
 GAIN = 3.0  # rad/s that are asked for a radian off the way
 BEND, SIDEWAYS = 3.0, 5.0  # rad/s, and m/s² across the way, at most
-SLOWED, SHARP = 2.0, 1.0  # m/s at most for who is more than so many radians off his way
+SLOWED, SHARP = 1.5, 1.0  # m/s at most for who is more than so many radians off his way
+HURRY = 0.8  # m/s more than they go, as an average of 0.3 s has it: people gain 3 m/s² or less
 STILL = 0.15  # m/s; who is asked for less is asked to stand
 ON_THE_SPOT, NEAR = 0.5, 0.35  # radians off beyond which, and on to which, who stands turns
 BRAKE, THERE = 1.0, 0.25  # 1/s, speed a metre before a place; m from it, where one stands
@@ -76,7 +77,9 @@ class Aim:
         off = torch.where(still, on_the_spot, off)
         sharp = (off.abs() > SHARP) & ~still
         speed = torch.where(sharp, speed.clamp(max=SLOWED), speed)
-        most = (SIDEWAYS / going.velocity.norm(dim=1).clamp(min=0.1)).clamp(max=BEND)
+        pace = going.velocity.norm(dim=1)
+        speed = torch.minimum(speed, (pace + HURRY).clamp(min=2 * STILL))
+        most = (SIDEWAYS / pace.clamp(min=0.1)).clamp(max=BEND)
         bend = torch.where(bend.isnan() | still, GAIN * off, bend)
         return speed, bend.clamp(-most, most), off
 

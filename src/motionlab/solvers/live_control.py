@@ -34,6 +34,7 @@ from .energy import Before
 from .guided import Going
 from .live_aim import STILL, Aim, wrapped
 from .live_feet import Behind
+from .live_frame import Gliding
 from .live_ways import WAYS, How, Window, answer
 from .run_up import begin_with
 from .windows import STRANGE
@@ -106,6 +107,7 @@ class LiveControl:
         self.before = Before(state, state.frame, place)
         self.going = Going.of(model.fps, place, state.frame[:, None, :3])
         self.aim = Aim.none(self.going)
+        self.gliding = Gliding(model, characters)
         self.behind = Behind(model.encoding, state.frame, place, refiner, lock)
         keep = max(1, round(KEPT * model.fps / window))
         self.kept: list[deque[Motion]] = [deque(maxlen=keep) for _ in range(characters)]
@@ -203,6 +205,7 @@ class LiveControl:
         begin = time.perf_counter()
         found = answer(self.model, self.before, self.going, self.aim, self.how)
         self._begin_again(found)
+        self.gliding.remind(found.frames, self.before.frame, found.after, found.going)
         self.before, self.going = found.after, found.going
         self.aim.onward(self.going)
         self.evaluations += found.evaluations
@@ -274,6 +277,7 @@ class LiveControl:
                 "p95": float(times.quantile(0.95)),
             },
             "begun again": self.lost[row],
+            "reminded of steps": self.gliding.reminded[row],
         }
         return record | {"notes": self._notes(row, record, led)}
 

@@ -5,7 +5,8 @@
 * The paper's (RNN-GAN, section 5.3): from the best of a few samples a gradient descends, through the
   recurrence, in an energy of speed, direction, contact and prior.
 
-Whoever is asked to stand is held by a stronger push, against whatever way he still goes.
+Whoever is asked to stand is held by a stronger push, against whatever way he still goes, and brings
+his feet together. What is drawn is kept to what bodies do (`live_frame`).
 """
 
 from __future__ import annotations
@@ -22,17 +23,15 @@ from ..models import LstmGmm, State
 from ..models.sampler import Chance, stepper
 from . import terms
 from .energy import Before, Energy
-from .guided import STANDING, Going
+from .guided import Going
 from .live_aim import STILL, Aim, wrapped
+from .live_frame import READY, bounded, stand_of, stood
 from .window import solve
 
 WAYS = ("push", "futures", "gradient")
-SHARE, TURN, PACE = 1.0, 1.2, 0.7  # as `guided`'s; who steers waits for less
+SHARE, TURN, PACE = 1.0, 1.2, 0.5  # as `guided`'s; who steers waits for less
 HOLD, AGAINST = 4.0, 1.2  # of the speed that is left to who should stand, and m/s at most
-QUIET, DAMPED = (
-    0.3,
-    0.6,
-)  # of the temperature that is left to them; of their bodies' moves that is taken
+QUIET = 0.3  # of the temperature that is left to them
 SPEED, WAY, TURNING = 0.15, 0.25, 0.5  # m/s, rad, rad/s: how far futures may be off
 FEET, CALM = 0.2, 0.1  # weights of the terms of feet and poses, and of a body that should be still
 SLOPE = {"feet": 0.3}  # weights of the terms of a gradient, by name
@@ -106,23 +105,23 @@ def _pushed(
 ) -> tuple[Tensor, Going, State]:
     """Frames (batch, window, kept), normalised, where they lead, and the state after them."""
     few = stepper(model, before.state, how.chance)
-    mean, std, kept = (getattr(model.normalizer, part) for part in ("mean", "std", "kept"))
-    columns = [int((kept == channel).nonzero()) for channel in range(3)]
-    body = kept > 2  # what is no step of the root, and no turn
+    std, kept, fps = model.normalizer.std[:3], model.normalizer.kept, model.fps
+    mean, columns = model.normalizer.mean[:3], [int((kept == i).nonzero()) for i in range(3)]
+    body, stand = kept > 2, stand_of(model)  # what is no step of the root, and no turn
     frames, still = [], aim.wanted(going)[0] < STILL
     few.calm(torch.where(still, QUIET, 1.0).float()[:, None].numpy())
     for t in range(how.window):
-        before_it = torch.from_numpy(few.seen)
-        push = few.seen * 0
-        pushes = _push(going, *aim.wanted(going, t / model.fps)[:2])
-        push[:, columns] = (torch.stack(pushes, 1) / std[:3]).numpy()
-        seen = torch.from_numpy(few.draw(push))
-        settling = (still & (going.velocity.norm(dim=1) < STANDING))[:, None]
-        moved = seen[:, body] - before_it[:, body]
-        seen[:, body] -= torch.where(settling, DAMPED, 0.0).to(seen) * moved
+        speed, bend, off = aim.wanted(going, t / fps)
+        last, push = torch.from_numpy(few.seen), few.seen * 0
+        push[:, columns] = (torch.stack(_push(going, speed, bend), 1) / std).numpy()
+        drawn = torch.from_numpy(few.draw(push))
+        seen = bounded(drawn, columns, model.normalizer, going, speed, bend)
+        stops = still & (going.velocity.norm(dim=1) < READY) & (off == 0)  # else he turns
+        seen = torch.where(stops[:, None], stood(seen, last, body, stand), seen)
+        few.seen = seen.numpy()
         few.see()
         frames.append(seen)
-        going.move(seen[:, columns] * std[:3] + mean[:3])
+        going.move(seen[:, columns] * std + mean)
     z = torch.stack(frames, 1)
     return z, going, State(model.normalizer.inverse(z[:, -1]), *few.after())
 
@@ -152,7 +151,8 @@ def _energy(
     value = value + torch.where(still, 0.0, (left.abs() / WAY).square() / 2)
     moved = (model.fps * z.diff(dim=1)[..., 6:]).square().mean((1, 2))
     value = value + torch.where(still, CALM * moved.double(), 0.0)
-    energy = Energy(model, before, _feet(model), {"prior": 0.0, "noise": 0.0})
+    wishes = _feet(model) | {"planted": terms.planted(model.encoding.skeleton, model.fps)}
+    energy = Energy(model, before, wishes, {"prior": 0.0, "noise": 0.0})
     whole = z.isfinite().flatten(1).all(1)
     parts = energy.parts(z.nan_to_num(0, 0, 0), z.new_zeros(*z.shape[:2], model.encoding.dim))
     return torch.where(whole, value + FEET * sum(parts.values()), torch.nan)

@@ -41,6 +41,7 @@ SPEED = 0.1  # m/s of a window's mean speed
 FACING = 0.2  # rad; people face 0.19 off their way
 STEP = 0.03  # m
 SLIDE, HEIGHT = 0.004, 0.008  # m a frame, m: a fifth of what sampled toes do; recorded do neither
+PLANTED = 0.3  # m/s of the slowest part of the feet
 REST = 0.006  # m a frame: less holds feet better, and jerks them
 POSE = (
     0.03  # rad, and m of the root's height, beyond what the data do; that is broken from 0.1 rad on
@@ -193,6 +194,23 @@ def resting(skeleton: Skeleton, fps: float, slide: float = REST, slower: float =
         moves = positions[:, :, feet].diff(dim=1)  # (batch, frames, 4, 3)
         slow = (moves.detach().norm(dim=-1) * fps < slower)[..., None]
         return _gaussian((moves[..., _GROUND] * slow).flatten(2), slide)
+
+    return term
+
+
+def planted(skeleton: Skeleton, fps: float, speed: float = PLANTED) -> Term:
+    """In each frame some part of the feet rests: who goes on without gets dearer with its speed, m/s.
+
+    A network that was led astray may glide: its feet move as fast as the body, and as it says that
+    neither is in contact, `contact` asks for nothing. A run's flight pays, too, but pays in any case.
+    Not the paper's.
+    """
+    feet = foot_points(skeleton)
+
+    @_looking_at(*feet)
+    def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
+        moves = positions[:, :, feet].diff(dim=1)[..., _GROUND]
+        return _gaussian(fps * moves.norm(dim=-1).amin(-1), speed)
 
     return term
 
