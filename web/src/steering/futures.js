@@ -74,7 +74,7 @@ export class Futures {
     if (this.frame) for (let i = ROOT; i < input.length; i++) sample.moved += (going.fps * (input[i] - before[i])) ** 2;
     going.move(row);
     sample.rows.push(row);
-    sample.inside.push({ next, component });
+    sample.inside.push({ next, component, pace: going.pace, bearing: going.bearing });
     if (this.judged) this.judge(sample, row);
   }
 

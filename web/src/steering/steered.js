@@ -39,14 +39,20 @@ export class Steered {
     this.characters.forEach((character, k) => {
       const track = new LiveTrack(this.encoding, this.fps, 0, { ...this.look, ...this.cast[k] }, KEPT);
       this.tracks.push(track);
-      const { first, aim, before: { next } } = character;
-      this.show(track, 0, { ...first, next, component: 0, asked: aim, energies: [0], chosen: 0 });
+      const { first, aim, before: { next, going } } = character;
+      const { pace, bearing } = going;
+      this.show(track, 0, { ...first, next, pace, bearing, component: 0, asked: aim, energies: [0], chosen: 0 });
     });
   }
 
   /** All of them are asked the same from the next window on: {speed, direction} or {speed, path}. */
   steer(wish) {
     for (const character of this.characters) character.steer(wish);
+  }
+
+  /** What each of them is asked, does, and does not. */
+  get records() {
+    return this.characters.map(({ record }) => record);
   }
 
   /** Frames up to `frame`; in so many milliseconds, as far as they can be made, and some more for what comes. */

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from torch import nn
@@ -14,6 +15,7 @@ from ...metrics import broken
 from .dream_settings import CONTROLS, REFINED, Control, check_starts
 from .network_weights import check_refiner
 
+COMPARED = ("#1d72b4", "#1f9e7a", "#c9689c")  # of characters beside the first
 CALMER = 0.6  # of the temperature at which a model ships, as of solvers.live_control
 SPEED = Control("speed", "Speed (m/s)", "What the arrow keys ask for; with Shift he runs", 0.4, 3.2,
                 0.1, 1.2)  # fmt: skip
@@ -25,7 +27,8 @@ HELP = Control("help", "Help", "Off: nothing is asked of the network, and it wan
 PUSH = Control("push", "Push", "How strongly each step is pushed to what is asked", 0, 1.5, 0.05, 1)
 FUTURES = Control("futures", "Futures (K)", "As many samples of the next five frames, of which the "
                   "best is kept", 1, 16, 1, 8)  # fmt: skip
-_CHANCE = {control.name: control for control in CONTROLS}
+_KNOWN = {control.name: control for control in CONTROLS}
+TEMPERATURE = replace(_KNOWN["temperature"], min=0.02, max=0.62, step=0.004)
 
 
 @dataclass(frozen=True)
@@ -48,9 +51,14 @@ def check_model(model: nn.Module) -> None:
     check_starts(model)
 
 
-def check_look(look: Look) -> None:
+def check_look(look: Look, beside: Sequence[int] = ()) -> None:
     """Raise ViewerError if a figure can't begin so."""
-    for control, value in ((SPEED, look.speed), (FUTURES, look.futures)):
+    if len(beside) not in (0, 2, 3, 4):
+        raise ViewerError(
+            f"steer: beside has {len(beside)} characters; it may have 2 to 4, or none."
+        )
+    counted = [(SPEED, look.speed), *((FUTURES, count) for count in (look.futures, *beside))]
+    for control, value in counted:
         if not isinstance(value, int | float) or not control.min <= value <= control.max:
             raise ViewerError(
                 f"steer: {control.name} is {value!r}; it goes from {control.min:g} to {control.max:g}."
@@ -69,14 +77,30 @@ def controls_of(model: nn.Module, look: Look, refiner: nn.Module | None) -> list
         "futures": look.futures,
         "temperature": round(CALMER * sampling.get("temperature", 1.0), 3),
         "memory": sampling.get("memory", 0.0),
+        "start": start_of(model),
     }
-    chance = [_CHANCE[name] for name in ("temperature", "memory", "start", "seed")]
+    chance = [TEMPERATURE, *(_KNOWN[name] for name in ("memory", "start", "seed"))]
     some = [SPEED, DIRECTION, ONWARD, HELP, PUSH, FUTURES, *chance]
     if refiner is not None:
         some.append(REFINED)
     return [
         asdict(control) | {"value": values.get(control.name, control.value)} for control in some
     ]
+
+
+def cast_of(beside: Sequence[int], color: str) -> list[dict[str, Any]]:
+    """Characters who are steered together: as the page reads them."""
+    colors = [color, *(each for each in COMPARED if each != color)]
+    return [
+        {"label": f"K = {count}", "color": each, "futures": int(count)}
+        for count, each in zip(beside, colors, strict=False)
+    ]
+
+
+def start_of(model: nn.Module) -> int:
+    """Who is steered stands at first, if the model has such a start."""
+    names = list(model.start_names)
+    return names.index("stand") if "stand" in names else 0
 
 
 def body_of(model: nn.Module) -> dict[str, Any]:
