@@ -3,6 +3,7 @@
 import { field, provenance } from "../network/panel.js";
 import { Player } from "../player.js";
 import { addStyle } from "../style.js";
+import { currentTheme, watchTheme } from "../theme.js";
 import { ASKED } from "./arrows.js";
 import { Commands } from "./commands.js";
 import { PageSource } from "./in_page.js";
@@ -22,6 +23,9 @@ export class SteerFigure {
     addStyle(figure);
     this.stage = make("div", "ml-stage");
     figure.append(this.stage);
+    this.unwatchTheme = watchTheme((theme) => { figure.dataset.mlTheme = theme; });
+    figure.dataset.mlTheme = currentTheme();
+    this.stage.addEventListener("motionlab:frame", () => this.lines && this.tell());
     this.choose(0);
   }
 
@@ -29,7 +33,7 @@ export class SteerFigure {
   choose(number) {
     clearInterval(this.telling);
     const { height } = this.content;
-    Object.assign(this, { network: this.content.networks[number], steered: null });
+    Object.assign(this, { network: this.content.networks[number], steered: null, lines: null });
     delete this.figure.dataset.live;
     this.settings = Object.fromEntries(this.network.controls.map(({ name, value }) => [name, value]));
     this.commands = new Commands(this.settings, (way) => this.put("direction", way));
@@ -101,7 +105,6 @@ export class SteerFigure {
     this.show((host) => new SteerPlayer(host, payload, this.still, this.steered, this.commands));
     this.setLive(true);
     this.look();
-    this.stage.addEventListener("motionlab:frame", () => this.tell());
     this.player.canvas.focus({ preventScroll: true });
     this.figure.dataset.live = "";
     this.tell();
@@ -167,5 +170,6 @@ export class SteerFigure {
     clearInterval(this.telling);
     this.player?.dispose();
     this.source.dispose?.();
+    this.unwatchTheme();
   }
 }
