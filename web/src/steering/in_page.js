@@ -1,5 +1,6 @@
 // Steering without a kernel: the page's own network makes the frames.
 import { pickStart } from "../network/guided.js";
+import { SHARE } from "../network/live_player.js";
 import { loadWeights, readWeights } from "../network/weights.js";
 import { Steered } from "./steered.js";
 
@@ -20,7 +21,8 @@ export class PageSource {
     return new Steered(weights, live.look, body, settings, cast);
   }
 
-  cost({ cost }) {
-    return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame.`;
+  cost({ cost, fps, cast }) {
+    const slow = cost > (SHARE * 1000) / fps ? " That is too much for this machine, and time passes slower" + (cast[0].futures ? "." : ": take fewer futures.") : "";
+    return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame.${slow}`;
   }
 }
