@@ -188,7 +188,8 @@ const answers = {
     const steered = new Steered(weights(name), look, body, { ...settings, memory: 0, push: 1, start, ...change }, cast);
     const said = futures.map(() => ({ rows: [], places: [], drawn: [], chosen: [], notes: [] }));
     for (let frame = 0; frame < frames; frame += 5) {
-      if (wishes[frame]) steered.steer(wishes[frame]);
+      const { points, ...wish } = wishes[frame] ?? {};
+      if (wishes[frame]) steered.steer(points ? { ...wish, path: new Path(points) } : wish);
       if (noise) {
         const left = { noise: noise.slice(frame, frame + 5).flat(2), uniform: uniform.slice(frame, frame + 5).flat() };
         const at = { noise: 0, uniform: 0 };

@@ -13,6 +13,7 @@ from tiny_lstm import tiny_clips, tiny_lstm
 
 import motionlab
 from motionlab.models.sampler_few import Few
+from motionlab.paths import Path
 from motionlab.solvers.live_control import LiveControl
 from motionlab.viewer.live.steer_settings import body_of
 
@@ -86,6 +87,23 @@ def test_the_same_wishes_and_chance_lead_the_same_way(tiny, tmp_path, way, futur
     assert np.linalg.norm(np.array(said["places"])[:, :2] - root[:, [0, 2]], axis=1).max() < 0.01
     assert np.ptp(root[:, 0]) > 1  # it did turn
     assert futures == 1 or len(set(said["chosen"])) == futures
+
+
+def test_who_goes_along_a_path_does_so_as_in_python(tiny, tmp_path):
+    """... and stands at its end."""
+    line = [[0.0, 0.5], [0.0, 3.0], [2.0, 4.0]]
+    tiny.sampling = {"temperature": 0.3}
+    noise, uniform = chance(FRAMES, 3, tiny.kept)
+    wishes = {0: {"speed": 1.0}, 30: {"speed": 1.0, "path": Path.through(line)}}
+    _, places = of_python(tiny, wishes, noise, uniform, way="futures")
+    wishes = {0: {"speed": 1.0}, 30: {"speed": 1.0, "points": line}}
+    (said,) = asking(tiny, tmp_path)(
+        "steered", start=0, body=body_of(tiny), wishes=wishes, frames=FRAMES, noise=noise.tolist(),
+        uniform=uniform.tolist(), change={"futures": 3, "temperature": 0.18},
+    )  # fmt: skip
+    apart = np.linalg.norm(np.array(said["drawn"])[:, :2] - places[:, :2], axis=1)
+    assert apart.max() < 0.01
+    assert np.linalg.norm(places[-1, :2] - line[-1]) < 1.0
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ export class Commands {
   /** `settings`: speed m/s, direction in degrees, onward; `turned(degrees)` is told of a way that a hand asked for. */
   constructor(settings, turned) {
     Object.assign(this, { settings, turned, keys: new Set(), stick: [0, 0], pad: [0, 0], running: false, padRuns: false });
+    this.path = null; // a Path to go along, until a hand does something
   }
 
   /** Nothing is pressed any more: the page has lost the focus, or nobody looks. */
@@ -30,11 +31,13 @@ export class Commands {
     return [keys, this.stick, this.pad].find(([left, ahead]) => Math.hypot(left, ahead) > QUIET) ?? [0, 0];
   }
 
-  /** {speed, direction} that is asked for, seen from a camera that looks `view` radians off +z. */
+  /** {speed, direction} that is asked for, or {speed, path}; seen from a camera that looks `view` radians off +z. */
   asked(view) {
     const { settings } = this;
     const [left, ahead] = this.hand;
     const far = Math.min(Math.hypot(left, ahead), 1);
+    if (far) this.path = null;
+    if (this.path) return { speed: settings.speed, path: this.path };
     if (!far) return { speed: settings.onward ? settings.speed : 0, direction: radians(settings.direction) };
     const direction = view + Math.atan2(left, ahead);
     const degrees = Math.round((180 * Math.atan2(Math.sin(direction), Math.cos(direction))) / Math.PI);

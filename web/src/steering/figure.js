@@ -6,6 +6,7 @@ import { addStyle } from "../style.js";
 import { currentTheme, watchTheme } from "../theme.js";
 import { ASKED } from "./arrows.js";
 import { Commands } from "./commands.js";
+import { Course } from "./course.js";
 import { PageSource } from "./in_page.js";
 import { Inside } from "./inside.js";
 import { SteerPlayer } from "./steer_player.js";
@@ -59,7 +60,8 @@ export class SteerFigure {
     this.fields = Object.fromEntries(used.map((control) => [control.name, field(control, this.network.starts, (name, value) => this.change(name, value))]));
     this.grid.append(...Object.values(this.fields));
     this.inside = make("div", "");
-    panel.append(this.told, this.go, this.status, this.grid, this.inside, ...(this.network.facts.length ? [provenance(this.network.facts)] : []));
+    this.course = new Course((path) => this.lead(path));
+    panel.append(this.told, this.go, this.status, this.grid, this.inside, this.course.element, ...(this.network.facts.length ? [provenance(this.network.facts)] : []));
     this.setLive(false);
     return panel;
   }
@@ -77,6 +79,7 @@ export class SteerFigure {
 
   setLive(live) {
     this.go.hidden = live;
+    this.course.element.hidden = !live || !this.source.leads;
     for (const part of [this.told, this.inside, ...Object.values(this.fields)]) part.hidden = !live;
   }
 
@@ -135,6 +138,12 @@ export class SteerFigure {
     this.player.refresh();
   }
 
+  /** Along a path (Path), or no longer. */
+  lead(path) {
+    this.commands.path = path;
+    if (path) this.player.play();
+  }
+
   /** A setting that a hand changed: its slider follows. */
   put(name, value) {
     this.settings[name] = value;
@@ -153,6 +162,7 @@ export class SteerFigure {
       this.lines[k].done.textContent = pace < 0.15 ? `does: ${pace.toFixed(2)} m/s` : `does: ${pace.toFixed(1)} m/s, ${degrees(bearing)}°`;
       if (seen.next) this.bars[k]?.show(seen);
     });
+    this.course.mark(this.steered.tracks.map((track) => [track.color, track.onGround(this.player.frame)]), this.player.frame);
   }
 
   /** What a frame costs, and what is not met. */

@@ -66,6 +66,7 @@ class KernelSteered {
 export class KernelSource {
   ready = true;
   looks = false;
+  leads = false;
 
   /** `model` is the widget's. */
   constructor(model) {

@@ -49,9 +49,11 @@ export class LiveControl {
     this.tooFast = speed > fastest ? speed : 0;
     aim.speed = Math.min(speed, fastest);
     if (direction !== undefined) Object.assign(aim, { direction: Math.atan2(Math.sin(direction), Math.cos(direction)), path: null });
-    if (path) Object.assign(aim, { path, arc: 0, speed: Math.max(aim.speed, 2 * STILL) });
+    const another = path && path !== aim.path; // who goes along one goes on
+    if (another) Object.assign(aim, { path, arc: 0 });
+    if (path) aim.speed = Math.max(aim.speed, 2 * STILL);
     const off = Math.abs(Math.atan2(Math.sin(aim.direction - this.aim.direction), Math.cos(aim.direction - this.aim.direction)));
-    if (path || Math.abs(aim.speed - this.aim.speed) > 0.05 || off > 0.05) this.askedAt = this.frames;
+    if (another || Math.abs(aim.speed - this.aim.speed) > 0.05 || off > 0.05) this.askedAt = this.frames;
     this.aim = aim;
   }
 
@@ -65,7 +67,8 @@ export class LiveControl {
   /** The frames of a window that is whole: rows as they are shown, their places, and what was inside. */
   take(refined) {
     const best = this.window.best();
-    const asked = this.window.aim;
+    const { speed, way } = this.window.aim.way(this.before.going, 0);
+    const asked = { speed, direction: way };
     this.window = null;
     if (this.apart(best)) this.again(best);
     this.before = { ...best, row: best.rows.at(-1) };
