@@ -37,7 +37,8 @@ FIGURES = re.compile(
     r"(</script>)",
     re.DOTALL,
 )
-SEEN = "figure.motionlab-player, figure.motionlab-dream, figure.motionlab-path"
+KINDS = "player", "dream", "path", "steer"
+SEEN = ", ".join(f"figure.motionlab-{kind}" for kind in KINDS)
 DRAWN = f"""() => [...document.querySelectorAll("{SEEN}")].map(({{ motionlab }}) => motionlab?.player ?? motionlab)
   .every((player) => !player?.visible || (player.casts && (player.playing || !player.dirty)))"""
 HERE = Path(__file__).parent

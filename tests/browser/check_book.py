@@ -6,8 +6,9 @@ Each page is opened from disk and from a local server, on a desktop and on a pho
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
 if a formula stays TeX; if a player stands still, does not follow its slider or saves nothing; if a
 scene stays empty or does not follow its own; if a network does not load and move, or too slowly; if a
-path that is drawn is not walked. It waits as long as a busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
-PATH (or its path in CHROMIUM).
+path that is drawn is not walked, or who is steered does not turn. It waits as long as a busy machine
+needs. Exit status 1, and one line for each trouble. Needs Chromium on the PATH (or its path in
+CHROMIUM).
 """
 
 import functools
@@ -23,6 +24,7 @@ from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 
+from check_steered import check_steered
 from PIL import Image
 from playwright.sync_api import BrowserContext, Page, TimeoutError, sync_playwright
 
@@ -130,14 +132,14 @@ class Visit:
 
         self._play(player, True)
         before, first = frame(), self._picture(player)
-        if not self._until(lambda: frame() != before and self._picture(player) != first):
+        if not self.until(lambda: frame() != before and self._picture(player) != first):
             self.trouble(f"{name} does not move")
 
         self._play(player, False)
         self._scrub(slider, 0.2, name)
         first = self._when_still(functools.partial(self._picture, player))
         self._scrub(slider, 0.7, name)
-        if not self._until(lambda: self._picture(player) != first):
+        if not self.until(lambda: self._picture(player) != first):
             self.trouble(f"{name} shows the same picture wherever its slider stands")
         if number == 0:  # one tells of all
             self._check_saving(player, name)
@@ -157,7 +159,7 @@ class Visit:
         """Take the slider to a share of its way; the player must leave it there."""
         target = round(share * slider.evaluate("s => Number(s.max)"))
         slider.fill(str(target))
-        if not self._until(lambda: abs(slider.evaluate("s => Number(s.value)") - target) <= 1):
+        if not self.until(lambda: abs(slider.evaluate("s => Number(s.value)") - target) <= 1):
             self.trouble(f"{name}: the slider does not scrub (asked for {target})")
 
     def check_scenes(self) -> None:
@@ -178,14 +180,14 @@ class Visit:
             return
         # Without the names of the axes: they are text, there before the scene is.
         picture = functools.partial(view.screenshot, style="#axes { visibility: hidden }")
-        if not self._until(lambda: contrast(picture()) >= CONTRAST):
+        if not self.until(lambda: contrast(picture()) >= CONTRAST):
             self.trouble(f"{name} draws nothing")
             return
         last = slider.evaluate("s => Number(s.max)")
         slider.fill(str(round(0.2 * last)))
         first = self._when_still(picture)
         slider.fill(str(round(0.7 * last)))
-        if not self._until(lambda: picture() != first):
+        if not self.until(lambda: picture() != first):
             self.trouble(f"{name} shows the same picture wherever its slider stands")
 
     def check_dreams(self) -> None:
@@ -208,7 +210,7 @@ class Visit:
             return
         frame = functools.partial(figure.evaluate, "f => f.motionlab.player.frame")
         self._play(figure, True)
-        if not self._until(lambda: frame() > 10):
+        if not self.until(lambda: frame() > 10):
             self.trouble(f"{name} does not move")
         best = figure.evaluate(FASTEST_STEP)
         if best > STEP:
@@ -242,7 +244,7 @@ class Visit:
             figure.and_(self.page.locator("[data-walked]")).wait_for(timeout=3 * PATIENCE)
             frame = functools.partial(figure.evaluate, "f => f.motionlab.player.frame")
             before = frame()
-            if not self._until(lambda: frame() != before):
+            if not self.until(lambda: frame() != before):
                 self.trouble(f"{name}: who walks does not move")
             if " cm from the line" not in (told := figure.inner_text()):
                 self.trouble(f"{name} does not say how far from the line it went: {told}")
@@ -250,7 +252,7 @@ class Visit:
             said = figure.locator("[aria-live=polite]").all_inner_texts()
             self.trouble(f"{name} is not walked: {' '.join(said)}")
 
-    def _until(self, done: Callable[[], bool]) -> bool:
+    def until(self, done: Callable[[], bool]) -> bool:
         """Whether it was done in time: drawing in software may take its while."""
         end = time.monotonic() + PATIENCE / 1000
         while not (was_done := done()) and time.monotonic() < end:
@@ -266,7 +268,7 @@ class Visit:
             seen.append(picture())
             return seen[-1] == seen[-2]
 
-        self._until(still)
+        self.until(still)
         return seen[-1]
 
     def _play(self, player, on: bool) -> None:
@@ -330,6 +332,7 @@ def check_page(window: BrowserContext, base: str, path: Path, folder: Path) -> l
         visit.check_scenes()
         visit.check_dreams()
         visit.check_paths()
+        check_steered(visit, PATIENCE)
     weight = own_weight(visit.loaded, base, folder)
     if weight > PAGE_BYTES:
         visit.trouble(f"weighs {weight / 1e6:.1f} MB, allowed {PAGE_BYTES / 1e6} MB")

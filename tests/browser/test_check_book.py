@@ -51,6 +51,15 @@ FAULTS = {
         "</svg><button>Walk</button><script>document.currentScript.parentElement.motionlab = "
         "{player: {get frame() { return Date.now(); }}}</script></figure>"
     ),
+    "steered 1 did not load: nothing beside": (
+        '<figure class="motionlab-steer"><canvas></canvas><button>Load the network</button>'
+        '<p role="status">nothing beside this page</p></figure>'
+    ),
+    "steered 1 does not turn": (
+        '<figure class="motionlab-steer" data-live><canvas tabindex="0"></canvas>'
+        "<button>Load the network</button><script>document.currentScript.parentElement.motionlab = "
+        "{steered: {characters: [{before: {going: {bearing: 0}}}]}}</script></figure>"
+    ),
     "scene 1 did not start": scene("The script of this scene is missing beside the page."),
     "scene 1 draws nothing": scene("<canvas></canvas>"),
     "scene 1 shows the same picture": scene("<canvas width=50 style='background: black'></canvas>"),

@@ -2,8 +2,9 @@
 import { PathFigure } from "./drawing/figure.js";
 import { Dream } from "./network/dream.js";
 import { Player } from "./player.js";
+import { SteerFigure } from "./steering/figure.js";
 
-const KINDS = { "motionlab-player": Player, "motionlab-dream": Dream, "motionlab-path": PathFigure };
+const KINDS = { "motionlab-player": Player, "motionlab-dream": Dream, "motionlab-path": PathFigure, "motionlab-steer": SteerFigure };
 
 function mount(figure, Kind) {
   const data = figure.querySelector('script[type="application/json"]');

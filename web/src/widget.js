@@ -1,8 +1,10 @@
-// Entry of the Jupyter widgets: ties the player to the traits of motionlab.viewer.Player, and the board to draw on
-// to the kernel that solves a path.
+// Entry of the Jupyter widgets: ties the player to the traits of motionlab.viewer.Player, and the board to draw on and
+// who is steered to the kernel that solves a path or makes his frames.
 import { PathFigure } from "./drawing/figure.js";
 import { KernelWalker } from "./drawing/in_kernel.js";
 import { Player } from "./player.js";
+import { SteerFigure } from "./steering/figure.js";
+import { KernelSource } from "./steering/in_kernel.js";
 
 const SHARED = ["playing", "speed", "follow", "overlay", "chosen"];
 const SAVE_EVERY = 200; // milliseconds: while it plays the kernel hears of the frame five times a second
@@ -66,12 +68,23 @@ function renderPlayer({ model, el }) {
   };
 }
 
-function renderPath({ model, el }) {
+/** A figure whose other side is a kernel. */
+function renderFigure({ model, el }, begin) {
   const host = hostIn(el);
-  const figure = new PathFigure(host, model.get("content"), null, new KernelWalker(model));
+  const figure = begin(host, model.get("content"));
   host.append(...caption(model));
   el.motionlab = host.motionlab = figure;
   return () => figure.dispose();
 }
 
-export default { render: (view) => (view.model.get("kind") === "path" ? renderPath(view) : renderPlayer(view)) };
+const FIGURES = {
+  path: (model) => (host, content) => new PathFigure(host, content, null, new KernelWalker(model)),
+  steer: (model) => (host, content) => new SteerFigure(host, content, null, new KernelSource(model)),
+};
+
+export default {
+  render: (view) => {
+    const begin = FIGURES[view.model.get("kind")]?.(view.model);
+    return begin ? renderFigure(view, begin) : renderPlayer(view);
+  },
+};

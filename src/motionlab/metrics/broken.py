@@ -72,12 +72,22 @@ def within(encoding: JointAngles, features: Tensor) -> Tensor:
     return torch.cat([features[..., :first], body, features[..., last:]], -1)
 
 
+def ranges(encoding: JointAngles) -> tuple[int, Tensor, Tensor]:
+    """The first channel that is judged, and the least and the largest value of it and those behind it.
+
+    encoding : one that this module `knows`.
+    """
+    first = _HEIGHT if encoding.skeleton.matches(Skeleton.canonical()) else _HEIGHT + 1
+    low, high, _ = (edge[first - _HEIGHT :] for edge in _ranges())
+    return first, low, high
+
+
 def _off(encoding: JointAngles, features: Tensor) -> tuple[Tensor, Tensor]:
     """How far outside its range each channel is, and the margins (channels,)."""
-    first = _HEIGHT if encoding.skeleton.matches(Skeleton.canonical()) else _HEIGHT + 1
+    first, low, high = ranges(encoding)
     body = features[..., first : encoding.slices["pose"].stop]
-    low, high, margins = (edge[first - _HEIGHT :].to(body) for edge in _ranges())
-    return torch.maximum(low - body, body - high), margins
+    off = torch.maximum(low.to(body) - body, body - high.to(body))
+    return off, _ranges()[2][first - _HEIGHT :].to(body)
 
 
 @cache

@@ -8,6 +8,7 @@ from .live.feeding import feeding
 from .live.knobs import knobs
 from .live.player import Player, bundle_path
 from .live.show import show
+from .live.steer import steer
 from .pictures import palette
 
 # Drawn by libraries that take their time to load: imported when first used.
@@ -28,6 +29,7 @@ __all__ = [
     "scene",
     "show",
     "stack",
+    "steer",
     "still",
     "video",
 ]

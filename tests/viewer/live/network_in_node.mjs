@@ -4,13 +4,15 @@ import { smoothed } from "../../../web/src/drawing/shapes.js";
 import { decode } from "../../../web/src/motion.js";
 import { Linear } from "../../../web/src/network/affine.js";
 import { Dreamer } from "../../../web/src/network/dreamer.js";
-import { guide, GuidedWalk, pickStart, recently, Steering, wanted } from "../../../web/src/network/guided.js";
+import { recently } from "../../../web/src/network/going.js";
+import { guide, GuidedWalk, pickStart, Steering, wanted } from "../../../web/src/network/guided.js";
 import { Lstm } from "../../../web/src/network/lstm.js";
 import { LstmGmm } from "../../../web/src/network/lstm_gmm.js";
 import { Random } from "../../../web/src/network/mixture.js";
 import { Path } from "../../../web/src/network/path.js";
 import { SimdLayer } from "../../../web/src/network/simd.js";
 import { readLayers, readWeights } from "../../../web/src/network/weights.js";
+import { Steered } from "../../../web/src/steering/steered.js";
 
 const { scripts, look, ask } = JSON.parse(readFileSync(process.argv[2], "utf8"));
 for (const script of scripts) new Function(readFileSync(script, "utf8"))();
@@ -175,6 +177,37 @@ const answers = {
     const grown = told(track);
     track.become(decode(whole)[0]);
     return { grown, become: told(track), whole: told(decode(whole)[0]) };
+  },
+
+  /**
+   * What who is steered does: rows, places of what is shown and of what was drawn, the sample that was kept. Wishes by frames;
+   * given noise (frames, samples, kept) and numbers from 0 to 1 (frames, samples), or a seed's own.
+   */
+  steered({ name, start, body, wishes, frames, noise, uniform, change = {}, futures = [null] }) {
+    const cast = futures.map((count) => ({ label: "", futures: count }));
+    const steered = new Steered(weights(name), look, body, { ...settings, memory: 0, push: 1, start, ...change }, cast);
+    const said = futures.map(() => ({ rows: [], places: [], drawn: [], chosen: [], notes: [] }));
+    for (let frame = 0; frame < frames; frame += 5) {
+      const { points, ...wish } = wishes[frame] ?? {};
+      if (wishes[frame]) steered.steer(points ? { ...wish, path: new Path(points) } : wish);
+      if (noise) {
+        const left = { noise: noise.slice(frame, frame + 5).flat(2), uniform: uniform.slice(frame, frame + 5).flat() };
+        const at = { noise: 0, uniform: 0 };
+        const next = (which) => left[which][at[which]++];
+        steered.characters[0].random = { uniform: () => next("uniform"), normal: () => next("noise") };
+      }
+      steered.reach(frame + 5);
+      steered.characters.forEach((character, k) => {
+        const shown = [1, 2, 3, 4, 5].map((t) => steered.tracks[k].at(frame + t));
+        const { x, z, yaw } = character.before.going.place;
+        said[k].rows.push(...shown.map(({ row }) => list(row)));
+        said[k].places.push(...shown.map(({ place }) => [place.x, place.z, place.yaw]));
+        said[k].drawn.push([x, z, yaw]);
+        said[k].chosen.push(shown[0].chosen);
+        said[k].notes = character.record.notes;
+      });
+    }
+    return said;
   },
 
   recently({ rows, fps }) {

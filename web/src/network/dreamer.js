@@ -7,6 +7,7 @@ import { LstmGmm } from "./lstm_gmm.js";
 import { Random } from "./mixture.js";
 import { Refiner } from "./refiner.js";
 import { RootRelative } from "./root_relative.js";
+import { normalizing } from "./rows.js";
 
 const NETWORKS = { AcLstm, LstmGmm };
 const ENCODINGS = { JointAngles, RootRelative };
@@ -20,6 +21,7 @@ export class Dreamer {
     this.network = new NETWORKS[weights.kind](weights.layers, weights.settings);
     this.encoding = new ENCODINGS[weights.encoding.kind](weights.encoding);
     this.normalizer = weights.normalizer;
+    Object.assign(this, normalizing(weights.normalizer));
     this.refiner = weights.refiner && new Refiner(weights.refiner, this.encoding, this);
     this.starts = weights.starts;
     this.fps = weights.fps;
@@ -119,18 +121,5 @@ export class Dreamer {
     const { track, place } = character;
     this.encoding.points(row, place, track.room(this.last));
     track.add(this.last, row, place);
-  }
-
-  normalize(row) {
-    const { kept, mean, std } = this.normalizer;
-    return Float32Array.from(kept, (channel) => (row[channel] - mean[channel]) / std[channel]);
-  }
-
-  /** Channels that never vary are their mean. */
-  denormalize(values) {
-    const { kept, mean, std } = this.normalizer;
-    const row = mean.slice();
-    kept.forEach((channel, i) => { row[channel] += values[i] * std[channel]; });
-    return row;
   }
 }

@@ -2,73 +2,39 @@
 // where a path leads. And what comes before it, as in run_up.py and path_control.py: a character who walks up
 // to the path's beginning, and a timetable that does not wait for who is late.
 import { Dreamer } from "./dreamer.js";
+import { clamp, Going, recently, STANDING } from "./going.js";
 import { Path } from "./path.js";
 
-const SHARE = 0.5; // of what is missing, a frame
-const SLOW = 0.3; // seconds that averages forget in
 const [LOOK, LEAST_LOOK] = [0.6, 0.5]; // seconds ahead, and metres at least, that are aimed at
-const [TURN, PACE] = [0.6, 0.6]; // rad/s and m/s that a push adds at most, a frame's share of them
-const BEND = 3; // rad/s that is asked for at most
-const STANDING = 0.3; // m/s: who is slower goes where he faces
 const [RUN_UP, SAMPLES, AVERAGE] = [1.2, 6, 0.8]; // seconds, characters, seconds: see run_up.py
 const LEEWAY = 0.3; // seconds behind a timetable that are caught up with
 const [PATIENCE, MORE] = [2, 34]; // times the frames of the timetable, and some, after which nobody waits
 const LOST = 2; // metres from his path, from where nobody finds back
 const HASTE = 3; // deviations above the data's mean step: nobody is faster
 
-const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-
-/** Where a character is on his path, what he did of late, and what he should do. */
+/** Where a character is on his path, and what he should do. */
 export class Steering {
   /** From the last steps and turns `recent` (rows) that led to a place {x, z, yaw}. */
   constructor(path, fps, place, arc, recent) {
-    const { off, speed, turn } = recently(recent, fps);
-    const going = place.yaw + off;
-    Object.assign(this, { path, fps, place, arc, turn });
-    this.velocity = [speed * Math.sin(going), speed * Math.cos(going)]; // m/s, as slow averages
+    Object.assign(this, { path, arc, going: Going.of(fps, place, recent) });
+  }
+
+  get place() {
+    return this.going.place;
   }
 
   /** Metres ahead and radians that the next frame should have more of, to go `speed` metres a second. */
   push(speed) {
     const aim = this.path.at(this.arc + Math.max(LOOK * speed, LEAST_LOOK));
-    const to = [aim[0] - this.place.x, aim[1] - this.place.z];
-    const pace = Math.hypot(...this.velocity);
-    const going = pace < STANDING ? this.place.yaw : Math.atan2(...this.velocity);
-    const off = Math.atan2(...to) - going;
-    const aside = clamp(Math.atan2(Math.sin(off), Math.cos(off)), -1.5, 1.5);
-    // the arc of a circle from here, this way, through there
-    const bend = (2 * Math.sin(aside) * speed) / Math.max(Math.hypot(...to), 0.2);
-    const lacking = clamp(bend, -BEND, BEND) - this.turn;
-    return {
-      ahead: clamp(SHARE * (speed - pace), -PACE, PACE) / this.fps,
-      turn: clamp(SHARE * lacking, -TURN, TURN) / this.fps,
-    };
+    const bend = this.going.bend([aim[0] - this.place.x, aim[1] - this.place.z], speed);
+    return this.going.lacking(speed, bend);
   }
 
   /** Go on by a frame's step to the left and ahead, and turn. */
-  move([left, ahead, turn]) {
-    const { x, z, yaw } = this.place;
-    const moved = turned(left, ahead, yaw);
-    this.place = { x: x + moved[0], z: z + moved[1], yaw: yaw + turn };
-    const keep = 1 / (SLOW * this.fps);
-    this.velocity = this.velocity.map((value, axis) => value + keep * (this.fps * moved[axis] - value));
-    this.turn += keep * (this.fps * turn - this.turn);
+  move(step) {
+    this.going.move(step);
     this.arc = this.path.nearest([this.place.x, this.place.z], this.arc - 0.2, this.arc + 0.5);
   }
-}
-
-/** A step to the left and ahead as x and z, of one who faces `yaw`. */
-const turned = (left, ahead, yaw) => [left * Math.cos(yaw) + ahead * Math.sin(yaw), ahead * Math.cos(yaw) - left * Math.sin(yaw)];
-
-/** Which way steps went, as seen from where they ended, in radians; how fast, and how fast they turned. */
-export function recently(recent, fps) {
-  const mean = [0, 0, 0];
-  let yaw = 0; // after the last
-  for (const [left, ahead, turn] of [...recent].reverse()) {
-    yaw -= turn;
-    [...turned(left, ahead, yaw), turn].forEach((value, i) => { mean[i] += value / recent.length; });
-  }
-  return { off: Math.atan2(mean[0], mean[1]), speed: fps * Math.hypot(mean[0], mean[1]), turn: fps * mean[2] };
 }
 
 /** What the timetable wants next, and a share of what is late or early, in metres a second. */

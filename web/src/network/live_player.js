@@ -6,7 +6,7 @@ import { Contacts, disposeAll, Tail } from "../marks.js";
 import { Player, TWIST } from "../player.js";
 import { KEPT } from "./live_track.js";
 
-const SHARE = 0.5; // of the time between pictures that networks may take, all of a page; slower machines play slower
+export const SHARE = 0.5; // of the time between pictures that networks may take, all of a page; slower machines play slower
 
 /** Time that asks the network for frames as it passes. */
 class LiveClock extends Clock {

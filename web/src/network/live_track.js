@@ -27,15 +27,15 @@ export class LiveTrack {
     return slot.points;
   }
 
-  /** Say of a frame, whose points are in their room, which row of features at which place it is. */
-  add(frame, row, place) {
+  /** Say of a frame, whose points are in their room, which row of features at which place it is, and what `more` is to be kept. */
+  add(frame, row, place, more = {}) {
     const { x, z, yaw } = place;
     const way = [[x, this.way?.[0]], [z, this.way?.[1]]].map(([at, way]) => follow(way, at, this.ease));
     this.way = way;
     // smoothing twice lags twice as much: what is between them makes up for it
     const middle = way.map(([once, twice]) => 2 * once - twice);
     const contacts = this.encoding.touching(row);
-    Object.assign(this.frames[frame % this.size], { contacts, middle, yaw, row, place });
+    Object.assign(this.frames[frame % this.size], { contacts, middle, yaw, row, place, ...more });
     this.last = frame;
   }
 

@@ -36,12 +36,13 @@ export function field(control, starts, change) {
   if (name === "start") {
     input = make("select", "ml-choice");
     starts.forEach((start, i) => input.add(new Option(start, min + i)));
+    input.value = value;
   } else {
     input = make("input", name === "seed" ? "ml-choice" : "ml-range");
     Object.assign(input, { type: name === "seed" ? "number" : "range", min, max, step });
     input.value = value;
   }
-  if (name === "refined") Object.assign(input, { type: "checkbox", className: "ml-tick", checked: Boolean(value) });
+  if (min === 0 && max === 1 && step === 1) Object.assign(input, { type: "checkbox", className: "ml-tick", checked: Boolean(value) });
   const tell = () => { shown.textContent = input.type === "range" ? input.value : ""; };
   input.addEventListener("input", () => {
     tell();

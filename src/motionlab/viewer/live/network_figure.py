@@ -22,8 +22,9 @@ class NetworkFigure:
     along.
 
     content : what web/src/page.js hands to it; still : a picture, as a data URL.
-    kind : which of the page's figures it is: "dream" or "path".
+    kind : which of the page's figures it is: "dream", "path" or "steer".
     room : pixels, beside the picture's height, that a frame of its own needs.
+    others : scripts of more weights that its reader may load.
     """
 
     def __init__(
@@ -34,14 +35,16 @@ class NetworkFigure:
         caption: str | None,
         kind: str = "dream",
         room: int = 420,
+        others: Sequence[WeightsScript] = (),
     ):
         self.content, self.weights, self.still, self.caption = content, weights, still, caption
-        self.kind, self.room = kind, room
+        self.kind, self.room, self.others = kind, room, others
 
     def _repr_html_(self) -> str:
         folder = os.environ.get("MOTIONLAB_SCRIPTS")  # set by a book's build
         if folder:
-            self.weights.write(folder)
+            for script in (self.weights, *self.others):
+                script.write(folder)
             return self.html
         page = html.escape(self.page(), quote=True)
         height = self.content["live"]["height"] + self.room
@@ -63,6 +66,7 @@ class NetworkFigure:
     def page(self) -> str:
         """A page that needs no other file."""
         scripts = [bundle_path().read_text(encoding="utf-8"), self.weights.text]
+        scripts += [script.text for script in self.others]
         # the words would end the element
         scripts = [script.replace("</script", r"<\/script") for script in scripts]
         inline = "".join(f"<script>{script}</script>" for script in scripts)

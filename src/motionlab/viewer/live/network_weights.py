@@ -68,7 +68,7 @@ def weights_script(
         "mean": _base64(normalizer.mean),
         "std": _base64(normalizer.std),
         "layers": {**packed, "leave": packed["leave"][0]},
-        "encoding": _encoding(model.encoding),
+        "encoding": encoding_of(model.encoding),
         "starts": [
             {"name": label, **{key: _base64(getattr(starts, key)[i]) for key in _STATE}}
             for i, label in enumerate(model.start_names)
@@ -193,7 +193,7 @@ def _base64(values: Tensor, kind: str = "<f4") -> str:
 # -- encodings --------------------------------------------------------------------------------------
 
 
-def _encoding(encoding: Encoding) -> dict[str, Any]:
+def encoding_of(encoding: Encoding) -> dict[str, Any]:
     """What turns rows into points."""
     skeleton = encoding.skeleton
     if isinstance(encoding, RootRelative):

@@ -1,0 +1,165 @@
+"""Hands that steer, in a page opened from disk: keys, a stick, a gamepad; no kernel, no server."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from steered_pages import SECOND, frames_pass, load, settled, until, value, write_pages
+
+check_book = pytest.importorskip("check_book", exc_type=ImportError)
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("steer")
+    write_pages(folder)
+    return folder
+
+
+def test_keys_turn_him_about(visit):
+    """By 180° within four seconds of his time, with the network that ships and its refiner."""
+    page = visit("shipped.html").page
+    load(page)  # and the picture has the focus
+    assert value(page, "commands.asked(0).speed") == 0
+    page.keyboard.down("ArrowUp")
+    frames_pass(page, 2 * SECOND)
+    assert abs(value(page, "steered.characters[0].aim.direction")) < 1e-6
+    page.keyboard.up("ArrowUp")
+    page.keyboard.down("KeyS")
+    took = settled(page, 180, 20, 8 * SECOND)
+    assert took <= 4 * SECOND, took
+    frames_pass(page, 2 * SECOND)
+    z = "player.tracks[0].at(1e9).place.z"
+    before = value(page, z)
+    frames_pass(page, SECOND)
+    assert value(page, z) < before - 0.5  # a second's walk back to where one looks from
+    page.keyboard.up("KeyS")
+    until(page, "figure.steered.characters[0].before.going.pace < 0.15")  # he stands
+
+
+def test_shift_runs(visit):
+    page = visit("shipped.html").page
+    load(page)
+    for key in ("Shift", "w"):
+        page.keyboard.down(key)
+    until(page, "figure.steered.characters[0].before.going.pace > 2.2")
+    page.keyboard.up("Shift")
+    until(page, "figure.steered.characters[0].before.going.pace < 1.6")
+
+
+def test_the_stick_steers_by_mouse_and_finger(visit):
+    page = visit(has_touch=True).page
+    load(page)
+    stick = page.locator(".ml-stick").bounding_box()
+    x, y = stick["x"] + stick["width"] / 2, stick["y"] + stick["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 60, y)
+    assert value(page, "commands.hand") == [1, 0]  # left, and not beyond
+    until(page, "Math.abs(figure.steered.characters[0].aim.direction - Math.PI / 2) < 0.01")
+    page.mouse.move(x, y - 17)
+    until(page, "Math.abs(figure.steered.characters[0].aim.speed - 0.6) < 0.01")  # half the way
+    page.mouse.up()
+    assert value(page, "commands.hand") == [0, 0]
+    finger = page.context.new_cdp_session(page)
+    touch = lambda kind, *at: finger.send(
+        "Input.dispatchTouchEvent",
+        {"type": kind, "touchPoints": [{"x": a, "y": b} for a, b in at]},
+    )
+    scrolled = page.evaluate("scrollY")
+    touch("touchStart", (x, y))
+    touch("touchMove", (x + 20, y + 60))
+    touch("touchMove", (x, y + 60))
+    until(page, "Math.abs(Math.abs(figure.steered.characters[0].aim.direction) - Math.PI) < 0.01")
+    touch("touchEnd")
+    assert value(page, "commands.hand") == [0, 0] and page.evaluate("scrollY") == scrolled
+
+
+def test_a_gamepad_steers(visit):
+    page = visit().page
+    load(page)
+    page.evaluate(
+        """() => { navigator.getGamepads = () => [null, { connected: true, axes: [-1, 0],
+        buttons: Array.from({ length: 8 }, (_, i) => ({ pressed: i === 7 })) }]; }"""
+    )
+    until(page, "Math.abs(figure.steered.characters[0].aim.direction - Math.PI / 2) < 0.01")
+    assert value(page, "commands.asked(0).speed") == 2.6
+    page.evaluate("navigator.getGamepads = () => []")
+    until(page, "figure.steered.characters[0].aim.speed === 0")
+
+
+def test_keys_act_while_the_picture_has_the_focus_and_only_then(visit):
+    page = visit().page
+    canvas = load(page)
+    outline = lambda: canvas.evaluate("canvas => getComputedStyle(canvas).outlineStyle")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Shift+Tab")  # back to it, by keyboard
+    assert outline() == "solid"
+    page.keyboard.down("ArrowDown")
+    assert value(page, "commands.hand") == [0, -1] and page.evaluate("scrollY") == 0
+    page.get_by_label("Seed").focus()  # a key that is held while the focus goes is let go
+    assert value(page, "commands.hand") == [0, 0]
+    page.keyboard.up("ArrowDown")
+    page.evaluate(
+        """() => {
+          document.activeElement.blur();
+          addEventListener("keydown", ({ defaultPrevented }) => { globalThis.taken = defaultPrevented; });
+        }"""
+    )
+    page.keyboard.down("ArrowDown")
+    assert page.evaluate("taken") is False  # the page scrolls as ever
+    assert value(page, "commands.hand") == [0, 0]
+
+
+@pytest.mark.parametrize("leave", ["blur", "visibilitychange"])
+def test_keys_are_let_go_when_window_or_tab_goes(visit, leave):
+    page = visit().page
+    load(page)
+    page.keyboard.down("KeyA")
+    assert value(page, "commands.hand") == [1, 0]
+    page.evaluate(
+        """leave => {
+          if (leave === "blur") return dispatchEvent(new Event("blur"));
+          Object.defineProperty(document, "hidden", { value: true });
+          document.dispatchEvent(new Event("visibilitychange"));
+        }""",
+        leave,
+    )
+    assert value(page, "commands.hand") == [0, 0]
+
+
+def test_it_rests_where_nobody_looks(visit):
+    page = visit().page
+    load(page)
+    frames_pass(page, 5)
+    page.locator("#end").scroll_into_view_if_needed()
+    until(page, "!figure.player.visible")
+    last = value(page, "steered.last")
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert value(page, "steered.last") == last
+
+
+def test_he_goes_along_a_line_that_is_drawn_until_a_hand_steers(visit):
+    page = visit("shipped.html").page
+    load(page)
+    page.get_by_text("Draw a line, and he goes along it").click()
+    page.evaluate(
+        "document.querySelector('figure').motionlab.course.board.take([[0, 0.5], [0, 2], [1, 2.5]])"
+    )
+    assert "A line of 2." in page.locator(".ml-course .ml-status").inner_text()
+    until(page, "figure.steered.characters[0].aim.arc > figure.commands.path.length - 0.5")
+    x, z = page.evaluate("document.querySelector('figure').motionlab.course.place")
+    assert math.hypot(x - 1, z - 2.5) < 1.2
+    page.locator("figure canvas").focus()
+    page.keyboard.down("ArrowUp")
+    until(page, "figure.commands.path === null && figure.steered.characters[0].aim.path === null")
+
+
+def test_who_asks_for_calm_starts_it_by_a_key(visit):
+    page = visit(reduced_motion="reduce").page
+    load(page)
+    assert not value(page, "player.playing")
+    page.keyboard.down("ArrowUp")
+    until(page, "figure.player.playing && figure.player.frame > 5")

@@ -1,0 +1,109 @@
+"""A steered character in a notebook: the widget's page, and a kernel that answers it."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from tiny_lstm import tiny_clips, tiny_lstm
+
+from motionlab.solvers.live_control import LiveControl
+from motionlab.viewer.live.player import STATIC
+from motionlab.viewer.live.steer_kernel import widget
+from motionlab.viewer.live.steer_settings import Look
+
+pytest.importorskip("check_book", exc_type=ImportError)
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+# A kernel's side of the widget, as a page: it says what it is sent and can be told things.
+WIDGET = """<!doctype html><html lang="en"><meta charset="utf-8"><link rel="icon" href="data:,"><title>steer</title>
+<body style="margin: 8px"><div id="el"></div><script type="module">
+const traits = {traits}, heard = {{}};
+globalThis.sent = [];
+globalThis.tell = (message) => heard["msg:custom"].forEach((hear) => hear(message));
+const model = {{
+  get: (name) => traits[name],
+  on: (event, hear) => (heard[event] ??= []).push(hear),
+  off: () => {{}},
+  send: (message) => sent.push(structuredClone(message)),
+}};
+{esm}
+widgetModule.render({{ model, el: document.getElementById("el") }});
+globalThis.figure = document.getElementById("el").motionlab;
+</script></body></html>"""
+PATIENCE = 60_000  # milliseconds
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("widget")
+
+
+@pytest.fixture
+def kernel_page(visit, folder):
+    """The widget's page; what a kernel would answer comes from the widget itself."""
+    tiny = tiny_lstm(tiny_clips("walk_1.2", "run_3.0", "stand"))
+    tiny.sampling = {"temperature": 0.3}
+    made = widget(tiny, LiveControl, None, (), Look(1.2, 4, 240, "#d98324"), "Steered")
+    traits = {"kind": "steer", "content": made.content, "caption": "Steered"}
+    esm = (STATIC / "widget.js").read_text(encoding="utf-8")
+    end = esm.rindex("export{")
+    name = esm[end:].split("{")[1].split(" as ")[0]
+    esm = f"{esm[:end]}\nconst widgetModule = {name};"
+    page = WIDGET.format(
+        traits=json.dumps(traits).replace("<", "\\u003c"), esm=esm.replace("</script", "<\\/script")
+    )
+    (folder / "widget.html").write_text(page, encoding="utf-8")
+    opened = visit("widget.html")
+    opened.page.wait_for_function("globalThis.figure")
+    told: list[dict] = []
+    made.send = told.append
+
+    def answer() -> dict:
+        """Answer the oldest question."""
+        opened.page.wait_for_function("sent.length > 0", timeout=PATIENCE)
+        message = opened.page.evaluate("sent.shift()")
+        made._asked(message)
+        opened.page.evaluate("message => tell(message)", told[-1])
+        return message
+
+    return opened.page, answer, made
+
+
+def test_a_kernel_is_asked_window_by_window(kernel_page):
+    page, answer, made = kernel_page
+    assert answer()["do"] == "begin"
+    page.wait_for_function("figure.steered?.last === 4", timeout=PATIENCE)
+    page.locator("canvas").focus()
+    page.keyboard.down("ArrowLeft")
+    for _ in range(12):
+        message = answer()
+        assert message["do"] == "go" and message["settings"]["futures"] == 4
+    assert message["wish"]["direction"] == pytest.approx(math.pi / 2, abs=1e-6)
+    assert page.evaluate("figure.steered.last") == 64
+    assert float(made.live[0].aim.direction[0]) == pytest.approx(math.pi / 2, abs=1e-6)
+    places = np.array(page.evaluate("figure.steered.tracks[0].ground()"))
+    np.testing.assert_allclose(places, made.motion().root_positions[:, [0, 2]], atol=1e-3)
+    page.get_by_text("frames a second; 30 are needed").wait_for(timeout=PATIENCE)
+    page.get_by_label("Term: slow feet rest").uncheck()
+    page.get_by_label("A gradient, too").check()
+    answer()  # on its way before
+    assert answer()["settings"]["term resting"] == 0
+    assert made.live[0].how.weights == {"resting": 0.0}
+
+
+def test_a_kernel_begins_again_and_says_what_went_wrong(kernel_page):
+    page, answer, made = kernel_page
+    answer()
+    page.wait_for_function("figure.steered?.last === 4", timeout=PATIENCE)
+    answer()
+    page.get_by_label("Seed").fill("5")
+    while answer()["do"] != "begin":
+        pass
+    page.wait_for_function("figure.steered.last === 4", timeout=PATIENCE)
+    assert made.motion().frames == 5
+    run = page.evaluate("figure.steered.run")
+    page.evaluate("message => tell(message)", {"run": run, "failed": "It was too cold."})
+    page.get_by_text("It was too cold.").wait_for(timeout=PATIENCE)

@@ -1,0 +1,65 @@
+// What is asked of a steered character, and what that means now: motionlab/solvers/live_aim.py. A speed and a way,
+// or a path, become a speed and a bend a frame that a body can do.
+import { clamp, wrapped } from "../network/going.js";
+
+const GAIN = 3; // rad/s that are asked for a radian off the way
+const [BEND, SIDEWAYS] = [3, 5]; // rad/s, and m/s² across the way, at most
+const [SLOWED, SHARP] = [2, 1]; // m/s at most for who is more than so many radians off his way
+export const STILL = 0.15; // m/s; who is asked for less is asked to stand
+const [ON_THE_SPOT, NEAR] = [0.5, 0.35]; // radians off beyond which, and on to which, who stands turns
+const [BRAKE, THERE] = [1, 0.25]; // 1/s, speed a metre before an end; m from it, where one stands
+const BEHIND = 2.6; // radians off, beyond which left and right are as good: the side that is begun stays
+const [LOOK, LEAST_LOOK] = [0.6, 0.5]; // seconds ahead, and metres at least, that are aimed at on a path
+
+export class Aim {
+  /** `speed` m/s, `direction` radians (0 is +z, π/2 is +x), or a `path` (Path), of which `arc` metres are behind. */
+  constructor(speed, direction, path = null, arc = 0) {
+    Object.assign(this, { speed, direction, path, arc });
+  }
+
+  /** Nobody has asked for anything: he goes on as he goes. */
+  static none(going) {
+    return new Aim(going.pace, going.bearing);
+  }
+
+  copy() {
+    return new Aim(this.speed, this.direction, this.path, this.arc);
+  }
+
+  /** Speed m/s, bend rad/s and radians off the way, as of now; `ahead`: seconds since the arc was true. */
+  wanted(going, ahead = 0) {
+    const { speed, way, bend } = this.way(going, ahead);
+    let off = wrapped(way - going.bearing);
+    if (Math.abs(off) > BEHIND && Math.abs(going.turn) > 0.2) off = Math.abs(off) * Math.sign(going.turn);
+    const still = speed < STILL;
+    if (still) {
+      const facing = wrapped(way - going.place.yaw);
+      off = Math.abs(facing) > (Math.abs(going.turn) > 0.5 ? NEAR : ON_THE_SPOT) ? facing : 0;
+    }
+    const sharp = Math.abs(off) > SHARP && !still;
+    const most = Math.min(SIDEWAYS / Math.max(going.pace, 0.1), BEND);
+    return {
+      speed: sharp ? Math.min(speed, SLOWED) : speed,
+      bend: clamp(bend === null || still ? GAIN * off : bend, -most, most),
+      off,
+    };
+  }
+
+  /** Speed, way and, of who is on a path, bend; else null. */
+  way(going, ahead) {
+    const { path, speed } = this;
+    if (!path) return { speed, way: this.direction, bend: null };
+    const arc = this.arc + ahead * speed;
+    const left = path.length - arc;
+    const near = left < THERE ? 0 : Math.max(BRAKE * left, 2 * STILL);
+    const slowed = Math.min(speed, near);
+    const there = path.at(arc + Math.max(LOOK * slowed, LEAST_LOOK));
+    const to = [there[0] - going.place.x, there[1] - going.place.z];
+    return { speed: slowed, way: Math.atan2(...to), bend: going.bend(to, slowed) };
+  }
+
+  /** Who goes along a path has come so far on it. */
+  onward({ place: { x, z } }) {
+    if (this.path) this.arc = this.path.nearest([x, z], this.arc - 0.2, this.arc + 0.5);
+  }
+}

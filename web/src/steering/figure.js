@@ -1,0 +1,185 @@
+// Steer a character: the picture, what may be set, what is asked and done, and a look inside. Who makes the frames, the
+// page's own network or a kernel, is a source; see in_page.js and in_kernel.js.
+import { field, provenance } from "../network/panel.js";
+import { Player } from "../player.js";
+import { addStyle } from "../style.js";
+import { currentTheme, watchTheme } from "../theme.js";
+import { ASKED } from "./arrows.js";
+import { Commands } from "./commands.js";
+import { Course } from "./course.js";
+import { PageSource } from "./in_page.js";
+import { Inside } from "./inside.js";
+import { SteerPlayer } from "./steer_player.js";
+
+const TELL_EVERY = 1000; // milliseconds
+const OF_HANDS = ["speed", "direction", "onward"]; // settings of what is asked; the others are of who does it
+
+const make = (tag, className, text = "") => Object.assign(document.createElement(tag), { className, textContent: text });
+const degrees = (angle) => Math.round((180 * angle) / Math.PI);
+
+export class SteerFigure {
+  /** `content` as motionlab/viewer/live/steer_settings.py writes it; `still` is an image URL. */
+  constructor(figure, content, still, source = new PageSource()) {
+    Object.assign(this, { figure, content, still, source });
+    addStyle(figure);
+    this.stage = make("div", "ml-stage");
+    figure.append(this.stage);
+    this.unwatchTheme = watchTheme((theme) => { figure.dataset.mlTheme = theme; });
+    figure.dataset.mlTheme = currentTheme();
+    this.stage.addEventListener("motionlab:frame", () => this.lines && this.tell());
+    this.choose(0);
+  }
+
+  /** Take one of the networks; until it is loaded there is a clip of it. */
+  choose(number) {
+    clearInterval(this.telling);
+    const { height } = this.content;
+    Object.assign(this, { network: this.content.networks[number], steered: null, lines: null });
+    delete this.figure.dataset.live;
+    this.settings = Object.fromEntries(this.network.controls.map(({ name, value }) => [name, value]));
+    this.commands = new Commands(this.settings, (way) => this.put("direction", way));
+    this.panel = this.build(number);
+    this.stage.append(this.panel);
+    if (this.source.ready) return this.load();
+    this.show((host) => new Player(host, { ...this.network.clip, height }, this.still));
+    this.say("This clip was sampled beforehand. Load the network, and it is yours to steer, here in this page.");
+    return null;
+  }
+
+  build(number) {
+    const { networks, beside } = this.content;
+    const panel = make("div", "ml-panel");
+    this.told = make("div", "ml-told");
+    this.status = make("p", "ml-status");
+    this.status.setAttribute("role", "status");
+    this.go = Object.assign(make("button", "ml-load", this.source.invitation(this.network)), { type: "button" });
+    this.go.addEventListener("click", () => this.load());
+    this.grid = make("div", "ml-grid");
+    if (networks.length > 1) this.grid.append(this.chooser(number));
+    const used = this.network.controls.filter(({ name }) => name !== "futures" || !beside.length);
+    this.fields = Object.fromEntries(used.map((control) => [control.name, field(control, this.network.starts, (name, value) => this.change(name, value))]));
+    this.grid.append(...Object.values(this.fields));
+    this.inside = make("div", "");
+    this.course = new Course((path) => this.lead(path));
+    panel.append(this.told, this.go, this.status, this.grid, this.inside, this.course.element, ...(this.network.facts.length ? [provenance(this.network.facts)] : []));
+    this.setLive(false);
+    return panel;
+  }
+
+  chooser(number) {
+    const box = make("label", "ml-field");
+    const choice = make("select", "ml-choice");
+    this.content.networks.forEach(({ name }, i) => choice.add(new Option(name, i)));
+    choice.value = number;
+    choice.setAttribute("aria-label", "Network");
+    choice.addEventListener("change", () => this.choose(Number(choice.value)));
+    box.append(make("span", "ml-caption", "Network"), choice);
+    return box;
+  }
+
+  setLive(live) {
+    this.go.hidden = live;
+    this.course.element.hidden = !live || !this.source.leads;
+    for (const part of [this.told, this.inside, ...Object.values(this.fields)]) part.hidden = !live;
+  }
+
+  show(build) {
+    this.player?.dispose();
+    this.stage.replaceChildren();
+    this.player = build(this.stage);
+    this.stage.append(this.panel);
+  }
+
+  async load() {
+    const { network, content: { beside, height, kept } } = this;
+    this.go.disabled = true;
+    this.say("Loading …");
+    try {
+      const cast = beside.length ? beside : [{ label: "", color: network.live.look.color, futures: null }];
+      const steered = await this.source.load(network, this.settings, cast);
+      if (this.network !== network) return; // another was chosen meanwhile
+      this.steered = steered;
+    } catch (error) {
+      this.go.disabled = false;
+      this.say(error.message);
+      return;
+    }
+    const payload = { ...network.live, height, kept, trail: [], autoplay: true };
+    this.show((host) => new SteerPlayer(host, payload, this.still, this.steered, this.commands));
+    this.setLive(true);
+    this.look();
+    this.player.canvas.focus({ preventScroll: true });
+    this.figure.dataset.live = "";
+    this.tell();
+    this.tellCost();
+    this.telling = setInterval(() => this.tellCost(), TELL_EVERY);
+  }
+
+  /** Lines that tell what is asked and done, and the bars. */
+  look() {
+    this.lines = this.steered.tracks.map(({ label, color }) => {
+      const line = make("p", "");
+      const [asked, done] = [make("span", "ml-name"), make("span", "ml-name")];
+      asked.style.setProperty("--ml-color", ASKED);
+      done.style.setProperty("--ml-color", color);
+      line.append(...(label ? [make("b", "", label)] : []), asked, done);
+      return { line, asked, done };
+    });
+    this.told.replaceChildren(...this.lines.map(({ line }) => line));
+    this.bars = this.steered.tracks.map(() => this.source.looks && new Inside(this.steered.weights, this.steered.weights.settings.components));
+    this.inside.replaceChildren(...this.bars.filter(Boolean).map(({ element }) => element));
+  }
+
+  change(name, value) {
+    this.settings[name] = value;
+    if (!this.steered || OF_HANDS.includes(name)) return;
+    this.steered.settings[name] = value;
+    if (this.content.restarts.includes(name)) this.player.reset();
+    this.player.refresh();
+  }
+
+  /** Along a path (Path), or no longer. */
+  lead(path) {
+    this.commands.path = path;
+    if (path) this.player.play();
+  }
+
+  /** A setting that a hand changed: its slider follows. */
+  put(name, value) {
+    this.settings[name] = value;
+    const input = this.fields[name]?.querySelector("input");
+    if (!input || input.valueAsNumber === value) return;
+    input.value = value;
+    input.dispatchEvent(new Event("input"));
+  }
+
+  /** Of the frame that is seen: what was asked and what was done. */
+  tell() {
+    this.steered.tracks.forEach((track, k) => {
+      const seen = track.at(this.player.frame);
+      const { asked: { speed, direction }, pace, bearing } = seen;
+      this.lines[k].asked.textContent = speed < 0.15 ? "asked: stand" : `asked: ${speed.toFixed(1)} m/s, ${degrees(direction)}°`;
+      this.lines[k].done.textContent = pace < 0.15 ? `does: ${pace.toFixed(2)} m/s` : `does: ${pace.toFixed(1)} m/s, ${degrees(bearing)}°`;
+      if (seen.next) this.bars[k]?.show(seen);
+    });
+    this.course.mark(this.steered.tracks.map((track) => [track.color, track.onGround(this.player.frame)]), this.player.frame);
+  }
+
+  /** What a frame costs, and what is not met. */
+  tellCost() {
+    const [first] = this.steered.records;
+    const notes = first?.notes.length ? ` Not met: ${first.notes.join("; ")}.` : "";
+    this.say(`${this.source.cost(this.steered)}${notes}`);
+  }
+
+  say(text) {
+    if (this.status.textContent !== text) this.status.textContent = text;
+  }
+
+  dispose() {
+    clearInterval(this.telling);
+    this.player?.dispose();
+    this.source.dispose?.();
+    this.unwatchTheme();
+  }
+}
