@@ -152,7 +152,7 @@ _STRNN = {
     ),
     "table": _TABLE,
     "ship": replace(
-        _TABLE, updates=48_000, decay=12_000, validate_every=1_000, width=192, quiet=30_000,
+        _TABLE, updates=28_000, decay=12_000, validate_every=1_000, width=192, quiet=30_000,
         alone=2_000, behind=6_000,
     ),
     "paper": replace(
