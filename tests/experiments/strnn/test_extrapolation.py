@@ -6,27 +6,11 @@ import math
 import pytest
 import torch
 
-import motionlab
 from experiments.strnn import extrapolation
-from motionlab.datasets import gaits
-from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import DataError
 from motionlab.training import PRESETS, Prepared, build
 from motionlab.training.checkpoints import save_weights
 from motionlab.training.strnn import in_body_frame
-
-
-@pytest.fixture(scope="module")
-def walks():
-    """Walks of five seconds as `prepare` makes them."""
-    encoding = JointAngles(motionlab.Skeleton.canonical(), 30, contacts=True)
-    make = lambda i: gaits.make(seconds=5, speed=1 + 0.1 * i, turn_rate=0.2 * (i % 3 - 1), seed=i)
-    clips = [encoding.encode(make(i)) for i in range(8)]
-    splits = ("train",) * 5 + ("val",) * 3
-    return Prepared(
-        torch.cat(clips), torch.tensor([len(clip) for clip in clips]),
-        tuple(f"gaits/{i}" for i in range(8)), splits, encoding, Normalizer.fit(clips), "walks",
-    )  # fmt: skip
 
 
 def test_an_oracle_foretells_without_error(walks):
@@ -99,6 +83,60 @@ def test_a_result_is_written(walks, tmp_path, monkeypatch):
     assert row["weights"]["settings"]["spatial"] is False and row["decoded"] > 0.1
     assert {"open loop, noise 0", "open loop, noise 0.1"} < set(row)
     assert found["starts"] == 2 and set(found["real"]["by source"]) == {"gaits"}
+    assert found["sources of starts"] == {"gaits": 2} and found["noise"] == [0, 0.1]
+
+
+def test_a_verdict_is_of_the_noise_that_was_chosen_and_of_the_same_without_residual(
+    walks, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Prepared, "find", lambda name: walks)
+    network = build(walks, PRESETS["strnn-temporal-hy"]["smoke"])
+    torch.nn.init.normal_(network.filter[-1].weight, std=0.02)
+    save_weights("some.safetensors", network, {"name": "strnn-temporal-hy"})
+    (tmp_path / "val.json").write_text(json.dumps(validated({0.02: loop(), 0.05: loop()})))
+    extrapolation.main(
+        ["some.safetensors", "--starts", "2", "--frames", "150", "--noise-chosen-in", "val.json",
+         "--without-residual", "--output", "found.json"]
+    )  # fmt: skip
+    found = json.loads((tmp_path / "found.json").read_text())
+    (row,) = found["rows"].values()
+    titles = [title for title in row if title.startswith("open loop")]
+    assert [*titles] == [
+        "open loop, noise 0", "open loop, noise 0.02", "open loop, noise 0, without residual"
+    ]  # fmt: skip
+    assert row[titles[0]] != row[titles[2]]
+
+
+def loop(alive=1.0, looping=0.0, period=2.0, moves=0.9):
+    return {"alive": alive, "in loops, of those alive": looping,
+            "periods (s)": [period] * (looping > 0), "movement, last minute, over real": moves}  # fmt: skip
+
+
+def validated(loops, split="val"):
+    rows = {f"open loop, noise {noise:g}": its for noise, its in ({0.0: loop()} | loops).items()}
+    return {"split": split, "noise": [0.0, *loops], "rows": {"some": rows}}
+
+
+@pytest.mark.parametrize(
+    ("loops", "chosen"),
+    [
+        ({0.02: loop(), 0.05: loop()}, 0.02),
+        ({0.02: loop(looping=0.3), 0.05: loop()}, 0.05),
+        ({0.02: loop(looping=0.3, period=20.0), 0.05: loop()}, 0.02),
+        ({0.02: loop(moves=0.3), 0.05: loop(looping=0.1)}, 0.05),
+        ({0.02: loop(looping=0.4), 0.05: loop(looping=0.3), 0.1: loop(alive=0.2)}, 0.05),
+        ({0.02: loop(alive=0.1), 0.05: loop(alive=0.2)}, 0.02),
+    ],
+)
+def test_the_noise_is_the_smallest_that_will_do(loops, chosen):
+    assert extrapolation.choose_noise(validated(loops)) == chosen
+
+
+def test_noise_is_never_chosen_on_test_clips():
+    for found in (validated({0.02: loop()}, "test"), validated({})):
+        with pytest.raises(DataError, match="on validation clips"):
+            extrapolation.choose_noise(found)
 
 
 def test_other_weights_are_refused(tmp_path, walks):
