@@ -6,6 +6,7 @@ import hashlib
 import json
 import shlex
 from dataclasses import asdict
+from pathlib import Path
 
 import torch
 from torch import nn
@@ -91,12 +92,15 @@ def shipped_as(sha256: str) -> str | None:
 def card(
     about: dict,
     model: nn.Module,
-    size: int,
+    file: Path,
     clips: int,
     minutes: float,
     remark: str = "",
 ) -> str:
-    """A generator's card, in Markdown; clips, minutes: of training motion; remark: on its limits."""
+    """The card, in Markdown, of a generator whose weights are in a file.
+
+    clips, minutes : of training motion; remark : on its limits.
+    """
     kind, name = type(model).__name__, about["name"]
     toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
     begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
@@ -123,7 +127,8 @@ motion = model.encoding.to_motion(features[0])
 | time until then | {about["seconds"] / 3600:.2f} h |
 | data | `{about["data_name"]}`, sha256 {about["data"]} |
 | training clips | {clips}, {minutes:.1f} minutes{mirrored} |
-| size | {_parameters(model)}, {size / 2**20:.1f} MiB |
+| size | {_parameters(model)}, {file.stat().st_size / 2**20:.1f} MiB |
+{_tensors(file)}
 {_held_out(about)}
 | sampling that suits it | {sampling or "as learned"} |
 | starts | {"; ".join(about["starts"])} |
@@ -146,8 +151,8 @@ apart.
 """
 
 
-def refiner_card(about: dict, model: nn.Module, size: int) -> str:
-    """A refiner's card, in Markdown."""
+def refiner_card(about: dict, model: nn.Module, file: Path) -> str:
+    """The card, in Markdown, of a refiner whose weights are in a file."""
     name, generator = about["name"], about["generator"]
     return f"""\
 # {name}
@@ -171,7 +176,8 @@ motion = model.encoding.to_motion(features[0])
 | seed | {about["preset"]["seed"]} |
 | time until then | {about["seconds"] / 60:.0f} minutes on one core |
 | data | `{about["data_name"]}`, sha256 {about["data"]} |
-| size | {_parameters(model)}, {size / 2**10:.0f} KiB |
+| size | {_parameters(model)}, {file.stat().st_size / 2**10:.0f} KiB |
+{_tensors(file)}
 
 {_judged(about)}
 
@@ -204,6 +210,10 @@ def _made_by(about: dict) -> str:
 def _parameters(model: nn.Module) -> str:
     count = sum(parameter.numel() for parameter in model.parameters())
     return f"{count:,} parameters in half precision"
+
+
+def _tensors(file: Path) -> str:
+    return f"| tensors | sha256 {weights.tensor_hash(file)}, by `motionlab.weights.tensor_hash` |"
 
 
 def _settings(about: dict) -> str:

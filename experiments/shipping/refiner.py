@@ -51,7 +51,7 @@ def ship(name: str, file: Path, generator: str | None, source: str, folder: Path
     }  # fmt: skip
     path = folder / f"{name}.safetensors"
     save_weights(path, halved, about, half=True)
-    text = refiner_card(about, halved, path.stat().st_size)
+    text = refiner_card(about, halved, path)
     write_whole(path.with_suffix(".md"), lambda stream: stream.write(text.encode()))
     return path
 

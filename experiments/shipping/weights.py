@@ -85,7 +85,7 @@ def ship(
     save_weights(path, halved, about, starts=state, half=True)
     clips = data.clips("train")
     minutes = sum(map(len, clips)) / data.encoding.fps / 60
-    text = card(about, halved, path.stat().st_size, len(clips), minutes, remark)
+    text = card(about, halved, path, len(clips), minutes, remark)
     write_whole(path.with_suffix(".md"), lambda stream: stream.write(text.encode()))
     return path
 

@@ -7,7 +7,7 @@ import shutil
 import pytest
 import torch
 from safetensors import safe_open
-from safetensors.torch import save_file
+from safetensors.torch import load_file, save_file
 
 import motionlab
 from experiments.shipping import cards
@@ -153,7 +153,31 @@ def test_card_says_what_the_file_holds(model, shipped, gaits, tmp_path):
     assert "familiar" not in about and "warns" not in model.card  # of 26 held-out seconds
     about = {**about, "familiar": {"likelihood": -12.5, "distance": 4.75}}
     said = "warns of a start | below -12.5 nats a frame, or beyond a distance of 4.75 |\n| sampling"
-    assert said in cards.card(about, model, 9, 9, 1.0)
+    assert said in cards.card(about, model, shipped, 9, 1.0)
+
+
+def test_the_hash_of_tensors_outlives_another_way_to_write_them(shipped, model, tmp_path):
+    tensors = load_file(shipped)
+    with safe_open(shipped, "pt") as file:
+        said = file.metadata()
+    again = tmp_path / "again.safetensors"
+    save_file(dict(reversed(tensors.items())), again, {**said, "by": "a tool"})
+    assert again.read_bytes() != shipped.read_bytes()
+    assert weights.tensor_hash(again) == weights.tensor_hash(shipped)
+    assert f"| tensors | sha256 {weights.tensor_hash(shipped)}," in model.card
+    name = min(tensors)
+    for other in ({**tensors, name: tensors[name] + 1}, {**tensors, name: tensors[name][None]}):
+        save_file(other, again, said)
+        assert weights.tensor_hash(again) != weights.tensor_hash(shipped), "nothing gets past it"
+    again.write_bytes(shipped.read_bytes()[:999])
+    with pytest.raises(motionlab.MotionLabError, match="again.safetensors: is no file of weights"):
+        weights.tensor_hash(again)
+
+
+@pytest.mark.parametrize("name", weights.names())
+def test_every_card_names_the_tensors_of_its_file(name):
+    card = weights.find(name).with_suffix(".md").read_text(encoding="utf-8")
+    assert f"| tensors | sha256 {weights.tensor_hash(name)}," in card
 
 
 def test_card_says_what_a_training_began_with(model, shipped, monkeypatch):
@@ -162,7 +186,7 @@ def test_card_says_what_a_training_began_with(model, shipped, monkeypatch):
     assert " --from WEIGHTS --updates 60" in cards.command_of(made, "gaits")
     monkeypatch.setattr(weights, "_FOLDER", shipped.parent)
     assert " --from tiny --updates 60" in cards.command_of(made, "gaits")
-    card = cards.card({**model.about, "start": model.hash}, model, 9, 9, 1.0)
+    card = cards.card({**model.about, "start": model.hash}, model, shipped, 9, 1.0)
     assert f"| began with | weights of sha256 {model.hash} |" in card
 
 

@@ -13,9 +13,10 @@ import hashlib
 import os
 from pathlib import Path
 
+import safetensors.torch
 from torch import nn
 
-from ..errors import ModelError
+from ..errors import ModelError, TrainingError
 
 _FOLDER = Path(__file__).parent
 
@@ -38,6 +39,30 @@ def find(name_or_path: str | os.PathLike) -> Path:
         f"{', '.join(names()) or 'none yet'}. "
         "`motionlab train` leaves its own in a file best.safetensors."
     )
+
+
+def tensor_hash(name_or_path: str | os.PathLike) -> str:
+    """sha256 of the tensors in a file of weights, the one that its card names.
+
+    Names, types, shapes and numbers count, in the order of the names. What else a file says does not,
+    nor in which order: it stays the same where other tools write the tensors anew, as a file's own
+    sha256 does not.
+
+    Raises
+    ------
+    ModelError : there are no such weights.
+    TrainingError : the file is damaged, or holds something else.
+    """
+    path = find(name_or_path)
+    try:
+        tensors = safetensors.torch.load_file(path)
+    except (OSError, safetensors.SafetensorError) as error:
+        raise TrainingError(f"{path}: is no file of weights, or a damaged one: {error}") from error
+    found = hashlib.sha256()
+    for name, tensor in sorted(tensors.items()):
+        found.update(f"{name} {tensor.dtype} {list(tensor.shape)}\n".encode())
+        found.update(tensor.numpy().tobytes())
+    return found.hexdigest()
 
 
 def load(name_or_path: str | os.PathLike) -> nn.Module:
