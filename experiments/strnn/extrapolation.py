@@ -71,8 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     data = in_body_frame(Prepared.find(chosen.data)).matching(models[0].encoding)
     clips = data.clips(chosen.split)
     longest = max(model.encode for model in models)
-    real, seeds = real_of(data), prefixes(clips, chosen.starts, longest)
-    begun = Counter(_sources(long_clips(clips, chosen.starts, longest), data))
+    sources = _sources(clips, data)
+    real, seeds = real_of(data), prefixes(clips, sources, chosen.starts, longest)
+    begun = Counter(_sources(long_clips(clips, sources, chosen.starts, longest), data))
     rows = {}
     for path, model in zip(chosen.weights, models, strict=True):
         row = {"weights": record.about_weights(model, path) | {"settings": settings(model)}}
@@ -123,18 +124,33 @@ def settings(model: Strnn) -> dict:
     return {name: getattr(model, name) for name in model.settings}
 
 
-def prefixes(clips: Sequence[Tensor], wanted: int, frames: int) -> Tensor:
+def prefixes(
+    clips: Sequence[Tensor], kinds: Sequence[str], wanted: int, frames: int
+) -> Tensor:  # fmt: skip
     """Frames (starts, frames, dim) from the middle of `long_clips`."""
-    chosen = long_clips(clips, wanted, frames)
+    chosen = long_clips(clips, kinds, wanted, frames)
     return torch.stack([clip[len(clip) // 2 - frames :][:frames] for clip in chosen])
 
 
-def long_clips(clips: Sequence[Tensor], wanted: int, frames: int) -> list[Tensor]:
-    """Clips spread over all that are twice as long; DataError if there is none."""
-    long = [clip for clip in clips if len(clip) >= 2 * frames]
+def long_clips(
+    clips: Sequence[Tensor], kinds: Sequence[str], wanted: int, frames: int
+) -> list[Tensor]:
+    """Clips that are twice as long, as many of each kind as there are: else most would be walks.
+
+    Where a kind has fewer, the others have more. DataError if there is none.
+    """
+    long: dict[str, list[Tensor]] = {}
+    for clip, kind in zip(clips, kinds, strict=True):
+        if len(clip) >= 2 * frames:
+            long.setdefault(kind, []).append(clip)
     if not long:
         raise DataError(f"None of {len(clips)} clips has {2 * frames} frames to begin in.")
-    return [long[i] for i in rollouts.spread_evenly(len(long), wanted)]
+    chosen, left = {}, min(wanted, sum(map(len, long.values())))
+    for done, kind in enumerate(sorted(long, key=lambda kind: (len(long[kind]), kind))):
+        count = min(len(long[kind]), -(-left // (len(long) - done)))
+        chosen[kind] = [long[kind][i] for i in rollouts.spread_evenly(len(long[kind]), count)]
+        left -= count
+    return [clip for kind in sorted(chosen) for clip in chosen[kind]]
 
 
 # -- forecasts ------------------------------------------------------------------------------------

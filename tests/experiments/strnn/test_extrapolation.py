@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections import Counter
 
 import pytest
 import torch
@@ -34,11 +35,29 @@ def test_an_oracle_foretells_without_error(walks):
 
 
 def test_prefixes_come_from_the_middle(walks):
-    clips = in_body_frame(walks).clips("val")
-    found = extrapolation.prefixes(clips, 2, 20)
+    clips, kinds = in_body_frame(walks).clips("val"), ["walks"] * 3
+    found = extrapolation.prefixes(clips, kinds, 2, 20)
     assert torch.equal(found[0], clips[0][55:75]) and torch.equal(found[1], clips[2][55:75])
     with pytest.raises(DataError, match="200 frames"):
-        extrapolation.prefixes(clips, 2, 100)
+        extrapolation.prefixes(clips, kinds, 2, 100)
+
+
+@pytest.mark.parametrize(
+    ("have", "wanted", "expected"),
+    [
+        ({"a": 30, "b": 30, "c": 30}, 9, {"a": 3, "b": 3, "c": 3}),
+        ({"a": 30, "b": 1, "c": 30}, 9, {"a": 4, "b": 1, "c": 4}),
+        ({"a": 30, "b": 2}, 3, {"a": 1, "b": 2}),
+        ({"a": 2, "b": 1}, 9, {"a": 2, "b": 1}),
+    ],
+)
+def test_starts_are_of_every_kind(have, wanted, expected):
+    kinds = [kind for kind, count in have.items() for _ in range(count)]
+    clips = [torch.full((40, 1), float(i)) for i in range(len(kinds))]
+    short = [torch.zeros(39, 1)] * 5  # count for nothing
+    found = extrapolation.long_clips([*clips, *short], [*kinds, *"ddddd"], wanted, 20)
+    at = [int(clip[0]) for clip in found]
+    assert Counter(kinds[i] for i in at) == expected and len(set(at)) == len(at)
 
 
 def test_real_motion_in_open_loop_is_sound_and_near_itself(walks):
