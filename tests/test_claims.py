@@ -10,6 +10,7 @@ import path_cases
 import pytest
 import refiner_cases
 import steering_cases
+import strnn_cases
 import yaml
 
 from experiments.claims import rnn_gan, verdicts
@@ -213,6 +214,7 @@ CASES = [
     *refiner_cases.CASES,
     *path_cases.CASES,
     *steering_cases.CASES,
+    *strnn_cases.CASES,
 ]  # fmt: skip
 
 

@@ -29,7 +29,22 @@ over the ground{toes}. It is no release of the authors of the paper.""",
 An auto-conditioned recurrent network (AcLstm; Zhou and others, *Auto-Conditioned Recurrent Networks for
 Extended Complex Human Motion Synthesis*, 2018) that goes on with motion of the style in its name,
 {fps:g} frames a second, as points in space. It is no release of the authors of the paper.""",
+    "Strnn": """\
+A network that reads frames, says them again and foretells the next ones, all at once (Strnn; Wang, Ho, Shum
+and Zhu, *Spatio-temporal Manifold Learning for Human Motions via Long-horizon Modeling*, 2021), of walking,
+running, dances, fights and gestures alike, {fps:g} frames a second, on the canonical skeleton of motionlab. It
+is no release of the authors of the paper.""",
 }
+SNIPPETS = {
+    "LstmGmm": """\
+features = model.generate(300, model.starts[0], **model.sampling)
+motion = model.encoding.to_motion(features[0])""",
+    "Strnn": """\
+seen = model.encoding.encode(motionlab.datasets.load("gaits")[0])
+features = model.extrapolate(seen, 300, **model.sampling)
+motion = model.encoding.to_motion(features)""",
+}
+SNIPPETS["AcLstm"] = SNIPPETS["LstmGmm"]
 LIMITS = {
     "LstmGmm": """\
 Nothing steers it: it goes where it likes. It knows level ground, and no other body than the canonical
@@ -38,6 +53,10 @@ one. Feet slide more than in its data; `motionlab evaluate {name}` measures by h
 Nothing steers it, and it draws no lots: one start has one future. It has seen a few minutes of a few
 people, and nothing keeps a bone's length. How long its dances last stands in
 `results/dances_rollouts.json` and in the book.""",
+    "Strnn": """\
+Nothing steers it, and it keeps to no kind of motion: a dance may end in a walk. Points have no bones, so that
+lengths waver until `to_motion` makes a body of them, and feet slide. How far it goes on by itself stands in
+`results/strnn_extrapolation.json`.""",
 }
 MEASURES = {
     "foot skate (cm/s)": "foot skate, cm/s",
@@ -104,7 +123,8 @@ def card(
     kind, name = type(model).__name__, about["name"]
     toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
     begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
-    mirrored = ", half of them mirror images" if kind == "LstmGmm" else ""
+    best = kind in ("LstmGmm", "Strnn")  # dancers are not mirrored, and their last weights ship
+    mirrored = ", half of them mirror images" if best else ""
     sampling = ", ".join(f"{key} {value:g}" for key, value in about["sampling"].items())
     return f"""\
 # {name}
@@ -113,14 +133,13 @@ def card(
 
 ```python
 model = motionlab.load("{name}")
-features = model.generate(300, model.starts[0], **model.sampling)
-motion = model.encoding.to_motion(features[0])
+{SNIPPETS[kind]}
 ```
 
 | | |
 |---|---|
 {_made_by(about)}
-| updates | {about["update"]}{", the best of validation" if kind == "LstmGmm" else ""} |
+| updates | {about["update"]}{", the best of validation" if best else ""} |
 | seed | {about["preset"]["seed"]} |
 | began with | {begun} |
 | precision of the training | {about["precision"]} |
@@ -131,7 +150,7 @@ motion = model.encoding.to_motion(features[0])
 {_tensors(file)}
 {_held_out(about)}
 | sampling that suits it | {sampling or "as learned"} |
-| starts | {"; ".join(about["starts"])} |
+| starts | {"; ".join(about["starts"]) or f"any {getattr(model, 'encode', 0)} frames"} |
 
 {_settings(about)}
 
@@ -229,8 +248,10 @@ def _held_out(about: dict) -> str:
     """Rows on how good it is on validation clips, and on what rounding costs."""
     if "log_likelihood" not in about:
         full, half = (about["validation loss"][kind] for kind in ("full", "half"))
+        both = ", of frames said again and of those foretold, added"
+        both = both if about["model"].startswith("strnn") else ""
         return (
-            f"| held-out loss | {half:.4f}, mean squared error of a channel in deviations |\n"
+            f"| held-out loss | {half:.4f}, mean squared error of a channel in deviations{both} |\n"
             f"| what rounding costs | {half - full:.5f} |"
         )
     full, half = (about["log_likelihood"][kind] for kind in ("full", "half"))

@@ -6,7 +6,7 @@
 
 Rounds the parameters to half precision, adds states to start from, of validation clips, fits the
 temperature of a mixture on these clips unless one is given, and says on the card what the weights
-are and what rounding costs. No number on the card is typed.
+are and what rounding costs. An STRNN has no states: it goes on from frames. No number on the card is typed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 import motionlab
 from motionlab import MotionLabError
-from motionlab.models import LstmGmm
+from motionlab.models import LstmGmm, Strnn
 from motionlab.models.familiar import bounds
 from motionlab.training import PRESETS, Prepared
 from motionlab.training.checkpoints import load_weights, save_weights, write_whole
@@ -50,11 +50,16 @@ def main(arguments: list[str] | None = None) -> None:
         for key in ("temperature", "component_temperature", "memory", "noise")
     }
     sampling = {key: value for key, value in sampling.items() if value is not None}
-    style = chosen.name.rpartition("-")[2] if chosen.name.startswith("aclstm") else "locomotion"
-    path = ship(
-        chosen.name, chosen.weights, chosen.data or style, chosen.folder, sampling, chosen.remark
-    )
+    source = chosen.data or usual_data(chosen.name)
+    path = ship(chosen.name, chosen.weights, source, chosen.folder, sampling, chosen.remark)
     print(path.with_suffix(".md").read_text(encoding="utf-8"))
+
+
+def usual_data(name: str) -> str:
+    """What weights of a name are trained on."""
+    if name.startswith("aclstm"):
+        return name.rpartition("-")[2]
+    return "everything" if name.startswith("strnn") else "locomotion"
 
 
 def ship(
@@ -64,11 +69,15 @@ def ship(
     data, model, made = with_data(file, source)
     licence = licence_of(made, data)  # if it is not known, fails before anything is written
     halved = rounded(model)
-    ready = mixture if isinstance(model, LstmGmm) else dancer
-    before, starts, sampling, facts = ready(model, halved, data, made, sampling)
-    with torch.no_grad():  # by the network as it will be
-        state = halved.observe(before)
-        halved.generate(2, state, **sampling)  # refuses what makes no sense
+    state, starts = None, []
+    if isinstance(model, Strnn):
+        facts = manifold(model, halved, data, made, sampling)
+    else:
+        ready = mixture if isinstance(model, LstmGmm) else dancer
+        before, starts, sampling, facts = ready(model, halved, data, made, sampling)
+        with torch.no_grad():  # by the network as it will be
+            state = halved.observe(before)
+            halved.generate(2, state, **sampling)  # refuses what makes no sense
     about = {
         **{key: made[key] for key in ("preset", "data", "precision", "update", "seconds")},
         "start": made.get("start"),
@@ -126,20 +135,32 @@ def mixture(
     return before, names, sampling, facts
 
 
-@torch.no_grad()
 def dancer(
     model: nn.Module, halved: nn.Module, data: Prepared, made: dict, sampling: dict
 ) -> Ready:
     """The same of a network that says frames, not what is likely."""
+    loss, _ = losses(model, halved, data, made)
+    before, names = before_starts(data, model.fps)
+    return before, names, sampling, {"validation loss": loss}
+
+
+def manifold(model: Strnn, halved: Strnn, data: Prepared, made: dict, sampling: dict) -> dict:
+    """What else to know of an STRNN."""
+    loss, windows = losses(model, halved, data, made)
+    halved.extrapolate(windows[:1, : model.encode], 2, **sampling)  # refuses what makes no sense
+    return {"validation loss": loss}
+
+
+@torch.no_grad()
+def losses(
+    model: nn.Module, halved: nn.Module, data: Prepared, made: dict
+) -> tuple[dict[str, float], Tensor]:
+    """Loss on validation windows in full precision and in half, and these windows."""
     preset = type(PRESETS[made["name"]]["ship"])(**made["preset"])
     windows = torch.cat(preset.windows(data, "val").tiles(1_000))
     extras = preset.judged(windows.shape)
-    loss = {
-        "full": model.loss(windows, **extras).item(),
-        "half": halved.loss(windows, **extras).item(),
-    }
-    before, names = before_starts(data, model.fps)
-    return before, names, sampling, {"validation loss": loss}
+    models = {"full": copy.deepcopy(model).eval(), "half": halved}
+    return {key: its.loss(windows, **extras).item() for key, its in models.items()}, windows
 
 
 if __name__ == "__main__":

@@ -1,17 +1,20 @@
 """What an STRNN foretells, and what becomes of motion that it goes on with by itself.
 
     python -m experiments.strnn.extrapolation WEIGHTS ... [--split val] [--starts 50]
-        [--frames 20000] [--noise 0 0.05]
+        [--frames 20000] [--noise 0 0.05] [--noise-chosen-in RESULT] [--without-residual]
 
 Forecasts stand beside zero velocity, the mean frame and a ridge regression; motion in open loop beside
-what recorded motion does. Nothing here is a verdict, so it is for validation clips unless told otherwise.
+what recorded motion does. It is for validation clips unless told otherwise: what is chosen, such as the
+noise, is chosen there, and verdicts are of test clips.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -30,6 +33,8 @@ from motionlab.training import Prepared
 from motionlab.training.strnn import in_body_frame
 from motionlab.training.windows import Windows
 
+from ..claims import strnn as rules
+from ..claims import verdicts
 from ..common import record, rollouts
 
 FLOOR = (
@@ -51,32 +56,67 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--starts", type=int, default=50)
     parser.add_argument("--frames", type=int, default=20_000)
     parser.add_argument("--noise", nargs="+", type=float, default=[0.0])
+    parser.add_argument("--noise-chosen-in", type=Path, help="no noise, and the best of a result")
+    parser.add_argument("--without-residual", action="store_true", help="the same without it, too")
     parser.add_argument("--output", default="results/strnn_extrapolation.json")
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
+    noises = chosen.noise
+    if chosen.noise_chosen_in:
+        noises = [0.0, choose_noise(json.loads(chosen.noise_chosen_in.read_text("utf-8")))]
     models = [motionlab.load(path) for path in chosen.weights]
     for path, model in zip(chosen.weights, models, strict=True):
         if not isinstance(model, Strnn):
             raise DataError(f"{path}: is a {type(model).__name__}, no STRNN.")
     data = in_body_frame(Prepared.find(chosen.data)).matching(models[0].encoding)
     clips = data.clips(chosen.split)
-    real, seeds = real_of(data), prefixes(clips, chosen.starts, max(m.encode for m in models))
+    longest = max(model.encode for model in models)
+    sources = _sources(clips, data)
+    real, seeds = real_of(data), prefixes(clips, sources, chosen.starts, longest)
+    begun = Counter(_sources(long_clips(clips, sources, chosen.starts, longest), data))
     rows = {}
     for path, model in zip(chosen.weights, models, strict=True):
         row = {"weights": record.about_weights(model, path) | {"settings": settings(model)}}
         row["forecasts"] = forecasts(model.extrapolate, clips, data, model.encode)
         row["decoded"] = decoded(model, clips, data)
-        for noise in chosen.noise:
-            generator = torch.Generator().manual_seed(0)
-            made = model.extrapolate(seeds, chosen.frames, noise=noise, generator=generator)
-            row[f"open loop, noise {noise:g}"] = opened(made, data, real, model.predict)
-            row[f"open loop, noise {noise:g}"]["manifold"] = manifold(made, data, real, clips)
+        loops = {f"open loop, noise {noise:g}": noise for noise in noises}
+        for title, noise in loops.items():
+            row[title] = open_loop(model, seeds, chosen.frames, noise, data, real, clips)
+        if chosen.without_residual and model.residual:
+            model.residual = False
+            title = "open loop, noise 0, without residual"
+            row[title] = open_loop(model, seeds, chosen.frames, 0.0, data, real, clips)
+            model.residual = True
         rows[str(path)] = row
     result = {
-        "split": chosen.split, "starts": len(seeds), "frames": chosen.frames, "rows": rows,
+        "split": chosen.split, "starts": len(seeds), "frames": chosen.frames, "noise": noises,
+        "sources of starts": begun, "rows": rows,
         "floors": floors(clips, data), "real": about_real(clips, data, real),
     }  # fmt: skip
     record.write(record.provenance(begin, 0, data) | result, chosen.output)
+
+
+def choose_noise(found: dict) -> float:
+    """Of a result of validation clips the noise that is used on test clips: the smallest that keeps
+    the limits of the claim S3, else that with the fewest short loops where most are alive.
+
+    Raises
+    ------
+    DataError : the result is of other clips, or of no noise.
+    """
+    (row,) = found["rows"].values()
+    noises = sorted(noise for noise in found["noise"] if noise)
+    if found["split"] != "val" or not noises:
+        raise DataError(
+            "Noise is chosen on validation clips, of --noise above 0; give the result of such a run."
+        )
+    limits = next(claim for claim in verdicts.claims() if claim["id"] == "S3-noise")["limits"]
+    loops = {noise: row[f"open loop, noise {noise:g}"] for noise in noises}
+    alive = [noise for noise in noises if loops[noise]["alive"] >= limits["half"]]
+    good = [noise for noise in alive if rules.holds(limits, loops[noise])]
+    if good or not alive:
+        return (good or noises)[0]
+    return min(alive, key=lambda noise: rules.short_loops(loops[noise]))
 
 
 def settings(model: Strnn) -> dict:
@@ -84,13 +124,33 @@ def settings(model: Strnn) -> dict:
     return {name: getattr(model, name) for name in model.settings}
 
 
-def prefixes(clips: Sequence[Tensor], wanted: int, frames: int) -> Tensor:
-    """Frames (starts, frames, dim) from the middle of clips spread over all that are twice as long."""
-    long = [clip for clip in clips if len(clip) >= 2 * frames]
+def prefixes(
+    clips: Sequence[Tensor], kinds: Sequence[str], wanted: int, frames: int
+) -> Tensor:  # fmt: skip
+    """Frames (starts, frames, dim) from the middle of `long_clips`."""
+    chosen = long_clips(clips, kinds, wanted, frames)
+    return torch.stack([clip[len(clip) // 2 - frames :][:frames] for clip in chosen])
+
+
+def long_clips(
+    clips: Sequence[Tensor], kinds: Sequence[str], wanted: int, frames: int
+) -> list[Tensor]:
+    """Clips that are twice as long, as many of each kind as there are: else most would be walks.
+
+    Where a kind has fewer, the others have more. DataError if there is none.
+    """
+    long: dict[str, list[Tensor]] = {}
+    for clip, kind in zip(clips, kinds, strict=True):
+        if len(clip) >= 2 * frames:
+            long.setdefault(kind, []).append(clip)
     if not long:
         raise DataError(f"None of {len(clips)} clips has {2 * frames} frames to begin in.")
-    chosen = [long[i] for i in rollouts.spread_evenly(len(long), wanted)]
-    return torch.stack([clip[len(clip) // 2 - frames :][:frames] for clip in chosen])
+    chosen, left = {}, min(wanted, sum(map(len, long.values())))
+    for done, kind in enumerate(sorted(long, key=lambda kind: (len(long[kind]), kind))):
+        count = min(len(long[kind]), -(-left // (len(long) - done)))
+        chosen[kind] = [long[kind][i] for i in rollouts.spread_evenly(len(long[kind]), count)]
+        left -= count
+    return [clip for kind in sorted(chosen) for clip in chosen[kind]]
 
 
 # -- forecasts ------------------------------------------------------------------------------------
@@ -171,6 +231,17 @@ def changes(points: Tensor, fps: float) -> Tensor:
     return metrics.motion_change(points - points[:, :1], fps)
 
 
+def open_loop(
+    model: Strnn, seeds: Tensor, frames: int, noise: float, data: Prepared, real: Real,
+    clips: Sequence[Tensor],
+) -> dict:  # fmt: skip
+    """What becomes of frames that go on from seeds, and how far their first ones are from clips."""
+    generator = torch.Generator().manual_seed(0)
+    made = model.extrapolate(seeds, frames, noise=noise, generator=generator)
+    found = opened(made, data, real, model.predict)
+    return found | {"manifold": manifold(made, data, real, clips)}
+
+
 def opened(made: Tensor, data: Prepared, real: Real, window: int) -> dict:
     """What became of rollouts (starts, frames, dim), made `window` frames at a time."""
     encoding, fps, frames = data.encoding, data.encoding.fps, made.shape[1]
@@ -246,7 +317,8 @@ def about_real(clips: Sequence[Tensor], data: Prepared, real: Real) -> dict:
     theirs = _long(clips, data)
     by_source: dict[str, list[float]] = {}
     each = metrics.manifold_distance(theirs, real.clips, fps).tolist()
-    for source, distance in zip(_sources(clips, data), each, strict=True):
+    long = [clip for clip in clips if len(clip) >= 4 / 3 * fps]
+    for source, distance in zip(_sources(long, data), each, strict=True):
         by_source.setdefault(source, []).append(distance)
     return {
         "motion change (m/s)": real.change, "acceleration (m/s²)": real.acceleration,
@@ -263,11 +335,11 @@ def _long(clips: Sequence[Tensor], data: Prepared) -> list[Tensor]:
 
 
 def _sources(clips: Sequence[Tensor], data: Prepared) -> list[str]:
-    """Of each clip that `_long` keeps the source of its name."""
+    """Of each clip the source in its name."""
     places = {}
     for name, its in zip(data.names, data.features.split(data.lengths.tolist()), strict=True):
         places[its.data_ptr()] = name.partition("/")[0]
-    return [places[c.data_ptr()] for c in clips if len(c) >= 4 / 3 * data.encoding.fps]
+    return [places[clip.data_ptr()] for clip in clips]
 
 
 if __name__ == "__main__":

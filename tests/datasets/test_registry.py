@@ -40,7 +40,7 @@ def performances():
 
 
 def test_names():
-    assert datasets.names() == ["gaits", "examples", "locomotion", *SIZES]
+    assert datasets.names() == ["gaits", "examples", "locomotion", "everything", *SIZES]
 
 
 @pytest.mark.parametrize("name", SIZES)

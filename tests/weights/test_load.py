@@ -13,6 +13,7 @@ import motionlab
 from experiments.shipping import cards
 from experiments.shipping.weights import ship
 from motionlab import contacts, metrics, weights
+from motionlab.datasets import gaits as gaits_of_ours
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import LstmGmm
 from motionlab.training.checkpoints import load_weights, save_weights
@@ -238,6 +239,30 @@ def test_a_dancer_ships_with_starts_and_a_card(tmp_path):
         assert said in model.card, said
 
 
+def test_an_strnn_ships_with_a_card_and_goes_on_from_frames(gaits, tmp_path):
+    from motionlab import datasets
+    from motionlab.training import PRESETS, build, loop
+
+    preset = PRESETS["strnn-temporal-hy"]["smoke"]
+    train = {"name": "strnn-temporal-hy", "accelerator": "cpu"}
+    loop.train(build(gaits.data, preset), gaits.data, preset, tmp_path, **train)
+    path = ship(
+        "strnn-tiny", tmp_path / "best.safetensors", str(gaits.path), tmp_path, {"noise": 0.05}
+    )
+    model = motionlab.load(path)
+    assert model.sampling == {"noise": 0.05} and model.start_names == ()
+    seen = model.encoding.encode(datasets.load("gaits")[0])
+    assert model.extrapolate(seen, 30, **model.sampling).isfinite().all()
+    half, full = (model.about["validation loss"][kind] for kind in ("half", "full"))
+    assert half != full and half == pytest.approx(full, rel=0.01)
+    for said in ("# strnn-tiny\n", "Long-horizon", f"held-out loss | {half:.4f}", "foretold", "MIT",
+                 "model.extrapolate(seen, 300", "any 20 frames", "the best of validation",
+                 "motionlab train strnn-temporal-hy --preset smoke"):  # fmt: skip
+        assert said in model.card, said
+    with pytest.raises(motionlab.MotionLabError, match="noise"):
+        ship("x", tmp_path / "best.safetensors", str(gaits.path), tmp_path, {"noise": -1.0})
+
+
 REFINERS = [name for name in weights.names() if name.startswith("refiner")]
 
 
@@ -266,10 +291,13 @@ def test_what_is_shipped(name):
     model = motionlab.load(name)
     assert weights.find(name).stat().st_size < 10 * 2**20
     assert model.about["name"] == name and model.card.startswith(f"# {name}\n")
-    assert 4 <= len(model.starts.frame) == len(model.start_names)
-    made = model.generate(
-        60, model.starts, generator=torch.Generator().manual_seed(0), **model.sampling
-    )
+    chance = torch.Generator().manual_seed(0)
+    if name.startswith("strnn"):
+        seen = model.encoding.encode(gaits_of_ours.make(seconds=2, speed=1.2))
+        made = model.extrapolate(seen, 60, generator=chance, **model.sampling)
+    else:
+        assert 4 <= len(model.starts.frame) == len(model.start_names)
+        made = model.generate(60, model.starts, generator=chance, **model.sampling)
     heights = model.encoding.positions(made)[..., 0, 1]
     lowest = 0.2 if name.startswith("aclstm") else 0.4  # recorded dancers crouch down to 0.24
     assert lowest < heights.min() and heights.max() < 1.4

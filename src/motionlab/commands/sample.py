@@ -199,6 +199,11 @@ def check_generates(model: nn.Module, name: str) -> None:
             f"{name}: is an STRNN, which goes on from frames and not from a state: "
             f"motionlab.load({name!r}).extrapolate(features, 300)."
         )
+    if hasattr(model, "project"):
+        raise MotionLabError(
+            f"{name}: is a {type(model).__name__}, which says motion again and makes none: "
+            f"motionlab.load({name!r}).project(features)."
+        )
     if not hasattr(model, "generate"):
         raise MotionLabError(
             f"{name}: is a {type(model).__name__.lower()}, which corrects motion and makes none; name "

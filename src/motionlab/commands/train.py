@@ -23,8 +23,9 @@ class Train:
 
     model: Positional[str]
     """lstm-gmm, lstm-gmm-contacts, lstm-gmm-permissive (with contacts, on the clips that are free
-    for commercial use); pfnn; strnn, and its ablations, such as strnn-temporal; refiner,
-    refiner-contacts, refiner-permissive of the first three; or METHOD-STYLE, such as
+    for commercial use); pfnn; strnn, and its ablations, such as strnn-temporal;
+    conv-autoencoder, its rival; refiner, refiner-contacts, refiner-permissive of the first three;
+    or METHOD-STYLE, such as
     aclstm-indian: one of the methods aclstm, lstm-3lr, scheduled, erd, seq2seq on one of the
     styles martial, indian, hybrid, walking."""
     preset: Literal["smoke", "table", "ship", "paper"] = "table"
@@ -82,7 +83,7 @@ class Train:
             ) from error
         chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
-        walks = self.model.startswith(("pfnn", "lstm-gmm", "strnn"))
+        walks = self.model.startswith(("pfnn", "lstm-gmm", "strnn", "conv-autoencoder"))
         style = "locomotion" if walks else self.model.rpartition("-")[2]
         data = Prepared.find(self.data or style, self._free, **self.folder.reading())
         if self.model == "lstm-gmm":

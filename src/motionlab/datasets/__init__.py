@@ -1,9 +1,9 @@
-"""Named data sets: real motion capture, fetched, checked and cached; its locomotion on
-one skeleton; and procedural gaits.
+"""Named data sets: real motion capture, fetched, checked and cached; its locomotion, or
+all of it, on one skeleton; and procedural gaits.
 
 >>> from motionlab import datasets
 >>> datasets.names()[:5]
-['gaits', 'examples', 'locomotion', 'bandai-locomotion', 'bandai-actions']
+['gaits', 'examples', 'locomotion', 'everything', 'bandai-locomotion']
 """
 
 from .about import Info

@@ -29,11 +29,13 @@ from .registry import (
     EXAMPLES,
     GAITS,
     LOCOMOTION,
+    ON_ONE_BODY,
     Clip,
     check_name,
     check_split,
     check_wanted,
     choose,
+    members,
     sources,
 )
 from .report import Report
@@ -108,13 +110,13 @@ def _from_files(name: str, wanted: Sequence[Clip], download: bool | None) -> lis
     process, prepare = _process(name, download)
     motions: dict[Clip, Motion] = {}
     to_parse: dict[str, list[Clip]] = {}
-    for label, members in _cached_together(name).items():
-        some = set(wanted).intersection(members)
-        cached = cache.read(label, members, process) if some else None
+    for label, together in _cached_together(name).items():
+        some = set(wanted).intersection(together)
+        cached = cache.read(label, together, process) if some else None
         if cached is not None:
-            motions.update(zip(members, cached, strict=True))
+            motions.update(zip(together, cached, strict=True))
         elif some:
-            to_parse[label] = [clip for clip in members if clip in some]
+            to_parse[label] = [clip for clip in together if clip in some]
     files.get(name, [clip for some in to_parse.values() for clip in some], download)
     with _progress(f"reading {name}", sum(map(len, to_parse.values()))) as bar:
         for label, some in to_parse.items():
@@ -132,7 +134,7 @@ def _from_files(name: str, wanted: Sequence[Clip], download: bool | None) -> lis
 
 def _process(name: str, download: bool | None) -> tuple[int, Callable[[Motion], Motion]]:
     """What is done to clips after reading: its number, for the cache, and a function."""
-    if name != LOCOMOTION:
+    if name not in ON_ONE_BODY:
         return 0, lambda motion: motion
     return locomotion.FORMAT, lambda motion: locomotion.bring(
         motion, stance(motion.source, download)
@@ -142,6 +144,7 @@ def _process(name: str, download: bool | None) -> tuple[int, Callable[[Motion], 
 @functools.cache
 def stance(source: str, download: bool | None = None) -> Motion | Stance | None:
     """That by which `locomotion` knows how a source's rig stands; None if its rest pose does."""
+    source = locomotion.SAME_RIG.get(source, source)
     if source in locomotion.LEARNED:
         together = load(source, clips=locomotion.LEARNED[source], download=download)
         return stances(together, Skeleton.canonical()).references[0]
@@ -152,11 +155,15 @@ def stance(source: str, download: bool | None = None) -> Motion | Stance | None:
 
 
 def _cached_together(name: str) -> dict[str, list[Clip]]:
-    """The clips of a data set by the cache file that they are in: one a split, for speed."""
+    """The clips of a data set by the cache file that they are in: one a split, for speed.
+
+    What is in `locomotion`, too, is kept there.
+    """
+    shared = set(members(LOCOMOTION)) if name in ON_ONE_BODY else set()
     groups: dict[str, list[Clip]] = {}
     for clip in choose(name):
-        label = f"{name}-{clip.split}"
-        if name == LOCOMOTION:
+        label = f"{LOCOMOTION if clip in shared else name}-{clip.split}"
+        if name in ON_ONE_BODY:
             label += f"-{clip.source}"
         groups.setdefault(name if name == EXAMPLES else label, []).append(clip)
     return groups

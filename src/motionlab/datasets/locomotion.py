@@ -12,6 +12,9 @@ retargeted to `Skeleton.canonical`. They keep their names, splits and licences. 
 * of ``o3de-motionmatching`` walks, runs, turns, also on the spot, in all directions; no takes of
   crouching, jumping and pushing;
 * of ``virvig-jl`` all but its T-pose.
+
+The data set "everything" is brought to the same body in the same way: these clips and all others, with
+dances, martial arts, basketball, gestures, crouches and jumps.
 """
 
 from __future__ import annotations
@@ -19,13 +22,15 @@ from __future__ import annotations
 from ..motion import Motion
 from ..retargeting import retarget
 from ..retargeting.flat_feet import Stance
-from .registry import LOCOMOTION_FPS
+from .registry import ONE_BODY_FPS
 
 # Raise this when retargeting changes, so that cached results are made anew.
 FORMAT = 9
 # Where a source's rest pose is no standing body: a clip that begins with standing upright, and how
 # many frames of it.
 STANCES = {"accad": ("Male1_B1_StandToWalk", 30), "virvig-jl": ("JL_mm_tpose", 1)}
+# Sources whose rig is that of another one, which tells how it stands.
+SAME_RIG = {"bandai-actions": "bandai-locomotion"}
 # Where nobody stands still either: clips that tell together how the source's rig stands.
 LEARNED = {
     "bandai-locomotion": (
@@ -38,4 +43,4 @@ LEARNED = {
 
 def bring(motion: Motion, stance: Motion | Stance | None = None) -> Motion:
     """One clip of a source to the canonical skeleton, by the stance of its source if it needs one."""
-    return retarget(motion.resample(LOCOMOTION_FPS), reference=stance)
+    return retarget(motion.resample(ONE_BODY_FPS), reference=stance)

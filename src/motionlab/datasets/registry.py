@@ -21,9 +21,12 @@ from .splits import SPLITS
 if TYPE_CHECKING:
     import pandas as pd
 
-GAITS, EXAMPLES, LOCOMOTION = "gaits", "examples", "locomotion"
-MIXED = (EXAMPLES, LOCOMOTION)  # of clips of several sources
-LOCOMOTION_FPS = 30
+GAITS, EXAMPLES, LOCOMOTION, EVERYTHING = "gaits", "examples", "locomotion", "everything"
+MIXED = (EXAMPLES, LOCOMOTION, EVERYTHING)  # of clips of several sources
+ON_ONE_BODY = (LOCOMOTION, EVERYTHING)
+ONE_BODY_FPS = 30
+# Not in `everything`: a frame that is no motion, and a clip that another source has a namesake of.
+LEFT_OUT = {("virvig-jl", "JL_mm_tpose"), ("cmu-amc", "02_01")}
 # of `table`
 COLUMNS = [
     "source",
@@ -186,7 +189,7 @@ def files_of(clips: Iterable[Clip]) -> list[File]:
 
 def names() -> list[str]:
     """Names that `load`, `info` and `table` know."""
-    return [GAITS, EXAMPLES, LOCOMOTION, *sources()]
+    return [GAITS, EXAMPLES, LOCOMOTION, EVERYTHING, *sources()]
 
 
 def check_name(name: str) -> None:
@@ -208,6 +211,8 @@ def members(name: str) -> list[Clip]:
     if name == LOCOMOTION:
         listed = set(_text("locomotion.tsv").splitlines()[1:])
         return [clip for clip in clips() if f"{clip.source}\t{clip.where}" in listed]
+    if name == EVERYTHING:
+        return [clip for clip in clips() if (clip.source, clip.name) not in LEFT_OUT]
     return [clip for clip in clips() if clip.source == name]
 
 
@@ -286,12 +291,12 @@ def info(name: str) -> Info:
         used = [sources()[source] for source in dict.fromkeys(c.source for c in members(name))]
         return Info(
             **about,
-            title=_toml()[EXAMPLES]["title"] if name == EXAMPLES else _LOCOMOTION_TITLE,
+            title=_toml()[EXAMPLES]["title"] if name == EXAMPLES else _TITLES[name],
             licence="; ".join(f"{s.name}: {_licence(s)}" for s in used),
             commercial=all(s.commercial for s in used),
             citation="as the sources: " + ", ".join(s.name for s in used),
             home="",
-            quirks=() if name == EXAMPLES else _LOCOMOTION_QUIRKS,
+            quirks=_QUIRKS.get(name, ()),
         )
     source = sources()[name]
     return Info(
@@ -305,11 +310,22 @@ def info(name: str) -> Info:
     )
 
 
-_LOCOMOTION_TITLE = "Walking, running, turning, starting, stopping on the canonical skeleton"
-_LOCOMOTION_QUIRKS = (
+_TITLES = {
+    LOCOMOTION: "Walking, running, turning, starting, stopping on the canonical skeleton",
+    EVERYTHING: "All clips of all sources on the canonical skeleton: locomotion, dances, fights, gestures",
+}
+_ON_ONE_BODY_QUIRKS = (
     "Retargeted and resampled to 30 frames per second when first loaded, which takes a minute or two.",
     "Speeds are scaled as the legs are: by 0.87 for accad, 0.89 for o3de-motionmatching.",
 )
+_QUIRKS = {
+    LOCOMOTION: _ON_ONE_BODY_QUIRKS,
+    EVERYTHING: (
+        *_ON_ONE_BODY_QUIRKS,
+        "Clips of locomotion are the same here, in the same splits, and cached once for both.",
+        "Wrong rotations of single frames in clips of aclstm-cmu and cmu are left as they are.",
+    ),
+}
 
 
 def _licence(source: Source) -> str:
@@ -331,16 +347,16 @@ def table(name: str | None = None) -> pd.DataFrame:
     if name == GAITS:
         return pd.DataFrame(_gait_rows(), columns=COLUMNS)
     found = clips() if name is None else members(name)
-    if name == LOCOMOTION:
+    if name in ON_ONE_BODY:
         found = [_resampled(clip) for clip in found]
     rows = [[getattr(clip, column) for column in COLUMNS] for clip in found]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _resampled(clip: Clip) -> Clip:
-    """A clip as the data set "locomotion" has it."""
-    frames = -(-clip.frames * LOCOMOTION_FPS // round(clip.fps))
-    return replace(clip, frames=frames, fps=float(LOCOMOTION_FPS))
+    """A clip as data sets on one body have it."""
+    frames = -(-clip.frames * ONE_BODY_FPS // round(clip.fps))
+    return replace(clip, frames=frames, fps=float(ONE_BODY_FPS))
 
 
 def _gait_rows() -> list[dict]:

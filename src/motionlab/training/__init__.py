@@ -5,12 +5,12 @@ one loop (`loop.train`), or for a refiner a game (`adversarial.train_game`). Onl
 lightning-fabric.
 """
 
-from . import dances, pfnn, presets, strnn
+from . import conv_autoencoder, dances, pfnn, presets, strnn
 from .games import GAMES
 from .prepared import Prepared, prepare
 from .presets import Preset, build
 
 # Of every model that can be trained, by its name.
-PRESETS = presets.PRESETS | dances.PRESETS | pfnn.PRESETS | strnn.PRESETS
+PRESETS = presets.PRESETS | dances.PRESETS | pfnn.PRESETS | strnn.PRESETS | conv_autoencoder.PRESETS
 
 __all__ = ["GAMES", "PRESETS", "Prepared", "Preset", "build", "prepare"]

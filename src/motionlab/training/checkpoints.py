@@ -18,10 +18,11 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import MotionLabError, TrainingError
-from ..models import AcLstm, Erd, LstmGmm, Refiner, Seq2Seq, Strnn
+from ..models import AcLstm, ConvAutoencoder, Erd, LstmGmm, Refiner, Seq2Seq, Strnn
 from ..models.pfnn import Pfnn
 
-_KINDS = {kind.__name__: kind for kind in (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn)}
+_MODELS = (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn, ConvAutoencoder)
+_KINDS = {kind.__name__: kind for kind in _MODELS}
 _STARTS = "starts."
 
 

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from .. import metrics
 from ..errors import TrainingError
-from ..models import LstmGmm, Strnn
+from ..models import ConvAutoencoder, LstmGmm, Strnn
 from ..models.familiar import bounds
 from ..models.pfnn import Pfnn
 from .checkpoints import load_weights, save_weights, write_whole
@@ -32,7 +32,7 @@ def finish(path: str | os.PathLike, data: Prepared) -> dict[str, float]:
 
     Starts are moments of validation clips. A mixture also gets the temperature at which its motion
     is as lively as those clips, and the bounds beyond which `observe` warns. A PFNN begins by itself, an STRNN
-    with frames.
+    with frames, an autoencoder with nothing.
     What the weights are is told in a card beside them.
 
     Raises
@@ -40,7 +40,7 @@ def finish(path: str | os.PathLike, data: Prepared) -> dict[str, float]:
     TrainingError : the file is missing, damaged, or can't be written.
     """
     model, about = load_weights(path)
-    if isinstance(model, Pfnn | Strnn):
+    if isinstance(model, Pfnn | Strnn | ConvAutoencoder):
         write_card(path)
         return {}
     model.eval()

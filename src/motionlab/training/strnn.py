@@ -152,8 +152,8 @@ _STRNN = {
     ),
     "table": _TABLE,
     "ship": replace(
-        _TABLE, updates=60_000, decay=15_000, validate_every=1_000, width=256, quiet=40_000,
-        alone=3_000, behind=7_000,
+        _TABLE, updates=28_000, decay=12_000, validate_every=1_000, width=192, quiet=30_000,
+        alone=2_000, behind=6_000,
     ),
     "paper": replace(
         _TABLE, updates=500_000, decay=0, width=512, validate_every=5_000, optimizer="adadelta",
