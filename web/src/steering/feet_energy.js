@@ -1,10 +1,11 @@
-// How badly feet slide and how far joints leave their range, in nats: the terms `resting`, `contact` and `poses` of
-// motionlab/solvers/terms.py, by which futures are chosen. Frame by frame, so that nothing has to be kept.
+// How badly feet slide and how far joints leave their range, in nats: the terms `resting`, `contact`, `planted` and
+// `poses` of motionlab/solvers/terms.py, by which futures are chosen. Frame by frame, so that nothing has to be kept.
 
 const [SLIDE, HEIGHT] = [0.004, 0.008]; // m a frame, m
 const REST = 0.006; // m a frame
 const SLOW = 0.45; // m/s
 const POSE = 0.03; // rad and m
+const PLANTED = 0.3; // m/s of the slowest part of the feet
 const GROUND = [0, 2];
 
 const square = (value) => value * value;
@@ -36,6 +37,8 @@ export class FeetEnergy {
     for (const move of moves) {
       if (Math.hypot(...move) * this.fps < SLOW) for (const axis of GROUND) sum += square(move[axis] / REST) / 2;
     }
+    const slowest = Math.min(...moves.map((move) => Math.hypot(...GROUND.map((axis) => move[axis]))));
+    sum += square((slowest * this.fps) / PLANTED) / 2;
     if (now.down) {
       now.down.forEach((down, side) => {
         if (!down) return;

@@ -1,0 +1,31 @@
+// What becomes of a drawn frame before the network sees it: motionlab/solvers/live_frame.py. A push may lead a network
+// to where no data were; so a frame is kept to what bodies do, and its step to what is asked and a stride's sway.
+import { clamp } from "../network/going.js";
+
+const LIMIT = 4; // deviations of the data
+const [SWAY, BRAKES] = [0.4, 1.3]; // m/s: that a stride sways; that is gone slower, sway aside
+const [SWING, SLOWER] = [1.2, 2]; // the same of a turn, rad/s
+const [ASIDE, BACK] = [0.6, 0.2]; // m/s at most: who is steered turns and goes ahead, and is not dragged
+export const READY = 0.6; // m/s; who stops and is slower brings his feet together
+const [DAMPED, PULLED] = [0.6, 0.15]; // shares, of their moves that is taken, of what lacks to a stand, a frame
+
+/**
+ * Make a frame `input`, normalised, what a body can do who is asked for this, in place. `columns`: those of the step to
+ * the left, the step ahead and the turn; `going`: before the frame; `speed` m/s and `bend` rad/s that are asked for.
+ */
+export function bound(input, columns, { mean, std }, going, { speed, bend }) {
+  for (let i = 0; i < input.length; i++) input[i] = clamp(input[i], -LIMIT, LIMIT);
+  const [left, ahead, turn] = columns.map((column, i) => (input[column] * std[i] + mean[i]) * going.fps); // a second
+  const most = Math.max(speed, going.pace - BRAKES) + SWAY;
+  const share = Math.min(most / Math.max(Math.hypot(left, ahead), 1e-9), 1);
+  const mostTurn = Math.max(Math.abs(bend), Math.abs(going.turn) - SLOWER) + SWING;
+  const root = [clamp(share * left, -ASIDE, ASIDE), Math.max(share * ahead, -BACK), clamp(turn, -mostTurn, mostTurn)];
+  columns.forEach((column, i) => { input[column] = (root[i] / going.fps - mean[i]) / std[i]; });
+}
+
+/** The body of who comes to stand moves less than was drawn, and towards a `stand` (normalised, or null), in place. */
+export function settle(input, last, body, stand) {
+  for (let i = 0; i < input.length; i++) {
+    if (body[i]) input[i] = last[i] + (1 - DAMPED) * (input[i] - last[i]) + (stand ? PULLED * (stand[i] - last[i]) : 0);
+  }
+}
