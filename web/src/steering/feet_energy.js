@@ -37,8 +37,7 @@ export class FeetEnergy {
     for (const move of moves) {
       if (Math.hypot(...move) * this.fps < SLOW) for (const axis of GROUND) sum += square(move[axis] / REST) / 2;
     }
-    const slowest = Math.min(...moves.map((move) => Math.hypot(...GROUND.map((axis) => move[axis]))));
-    sum += square((slowest * this.fps) / PLANTED) / 2;
+    sum += square((this.slowest(before, now) * this.fps) / PLANTED) / 2;
     if (now.down) {
       now.down.forEach((down, side) => {
         if (!down) return;
@@ -48,6 +47,11 @@ export class FeetEnergy {
       });
     }
     return sum + this.beyond(row);
+  }
+
+  /** Metres over the ground that the part of the feet moved that moved least. */
+  slowest(before, now) {
+    return Math.min(...now.feet.map((foot, i) => Math.hypot(...GROUND.map((axis) => foot[axis] - before.feet[i][axis]))));
   }
 
   /** Nats of what lies outside its range. */

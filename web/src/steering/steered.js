@@ -28,7 +28,9 @@ export class Steered {
     const stand = weights.starts.find(({ name }) => name === "stand");
     this.parts = {
       network, encoding, refiner, fps, ...rows, fastest: this.fastest, normalizer: weights.normalizer,
-      stand: stand ? rows.normalize(stand.frame) : null, feet: new FeetEnergy(encoding, fps, body),
+      starts: weights.starts, stand: stand ? rows.normalize(stand.frame) : null,
+      layers: (numbers) => network.lstm.map(({ width, depth }) => numbers.slice(depth * width, (depth + 1) * width)),
+      feet: new FeetEnergy(encoding, fps, body),
     };
     this.restart();
   }
