@@ -11,6 +11,7 @@ import { fastestOf, LiveControl } from "./live_control.js";
 
 export const KEPT = 120; // seconds that can be saved
 const AHEAD = 3; // frames: a window is begun so long before it is due, or who plays would wait for it
+const NEAR = 1; // metres from a path's beginning from where on it is followed
 const APART = 1.5; // metres between characters at first
 
 export class Steered {
@@ -53,7 +54,19 @@ export class Steered {
 
   /** All of them are asked the same from the next window on: {speed, direction} or {speed, path}. */
   steer(wish) {
-    for (const character of this.characters) character.steer(wish);
+    for (const character of this.characters) character.steer(this.near(wish, character) ? wish : this.toBeginning(wish, character));
+  }
+
+  /** Whether somebody is on the path that is asked, or where it begins: an arc from farther away is a detour. */
+  near({ path }, { aim, before: { going: { place } } }) {
+    if (!path || aim.path === path) return true;
+    const [x, z] = path.at(0);
+    return Math.hypot(x - place.x, z - place.z) < NEAR;
+  }
+
+  toBeginning({ speed, path }, { before: { going: { place } } }) {
+    const [x, z] = path.at(0);
+    return { speed, direction: Math.atan2(x - place.x, z - place.z) };
   }
 
   /** What each of them is asked, does, and does not. */
