@@ -9,7 +9,7 @@ const [SWING, SLOWER] = [1.2, 2]; // the same of a turn, rad/s
 const [ASIDE, BACK] = [0.6, 0.2]; // m/s at most: who is steered turns and goes ahead, and is not dragged
 export const READY = 0.6; // m/s; who stops and is slower brings his feet together
 const [DAMPED, PULLED] = [0.6, 0.15]; // shares, of their moves that is taken, of what lacks to a stand, a frame
-const [RESTS, GLIDES] = [0.5, 0.4]; // m/s of a foot at most; seconds without: a run's flight is half as long
+const [RESTS, GLIDES] = [0.5, 0.3]; // m/s of a foot at most; seconds without: a run's flight is shorter
 
 /**
  * Make a frame `input`, normalised, what a body can do who is asked for this, in place. `columns`: those of the step to
@@ -48,8 +48,7 @@ export class Gliding {
     for (const row of best.rows) {
       place = encoding.walk(place, row);
       const now = feet.seen(row, place);
-      const speed = fps * feet.slowest(last, now);
-      rested ||= speed < RESTS || !Number.isFinite(speed);
+      rested ||= fps * feet.slowest(last, now) < RESTS;
       last = now;
     }
     this.frames = rested ? 0 : this.frames + best.rows.length;
