@@ -4,7 +4,8 @@ import { clamp, wrapped } from "../network/going.js";
 
 const GAIN = 3; // rad/s that are asked for a radian off the way
 const [BEND, SIDEWAYS] = [3, 5]; // rad/s, and m/s² across the way, at most
-const [SLOWED, SHARP] = [2, 1]; // m/s at most for who is more than so many radians off his way
+const [SLOWED, SHARP] = [1.5, 1]; // m/s at most for who is more than so many radians off his way
+const HURRY = 0.8; // m/s more than they go, as an average of 0.3 s has it: people gain 3 m/s² or less
 export const STILL = 0.15; // m/s; who is asked for less is asked to stand
 const [ON_THE_SPOT, NEAR] = [0.5, 0.35]; // radians off beyond which, and on to which, who stands turns
 const [BRAKE, THERE] = [1, 0.25]; // 1/s, speed a metre before an end; m from it, where one stands
@@ -39,7 +40,7 @@ export class Aim {
     const sharp = Math.abs(off) > SHARP && !still;
     const most = Math.min(SIDEWAYS / Math.max(going.pace, 0.1), BEND);
     return {
-      speed: sharp ? Math.min(speed, SLOWED) : speed,
+      speed: Math.min(sharp ? Math.min(speed, SLOWED) : speed, Math.max(going.pace + HURRY, 2 * STILL)),
       bend: clamp(bend === null || still ? GAIN * off : bend, -most, most),
       off,
     };

@@ -1,10 +1,11 @@
-// How badly feet slide and how far joints leave their range, in nats: the terms `resting`, `contact` and `poses` of
-// motionlab/solvers/terms.py, by which futures are chosen. Frame by frame, so that nothing has to be kept.
+// How badly feet slide and how far joints leave their range, in nats: the terms `resting`, `contact`, `planted` and
+// `poses` of motionlab/solvers/terms.py, by which futures are chosen. Frame by frame, so that nothing has to be kept.
 
 const [SLIDE, HEIGHT] = [0.004, 0.008]; // m a frame, m
 const REST = 0.006; // m a frame
 const SLOW = 0.45; // m/s
 const POSE = 0.03; // rad and m
+const PLANTED = 0.3; // m/s of the slowest part of the feet
 const GROUND = [0, 2];
 
 const square = (value) => value * value;
@@ -36,6 +37,7 @@ export class FeetEnergy {
     for (const move of moves) {
       if (Math.hypot(...move) * this.fps < SLOW) for (const axis of GROUND) sum += square(move[axis] / REST) / 2;
     }
+    sum += square((this.slowest(before, now) * this.fps) / PLANTED) / 2;
     if (now.down) {
       now.down.forEach((down, side) => {
         if (!down) return;
@@ -45,6 +47,11 @@ export class FeetEnergy {
       });
     }
     return sum + this.beyond(row);
+  }
+
+  /** Metres over the ground that the part of the feet moved that moved least. */
+  slowest(before, now) {
+    return Math.min(...now.feet.map((foot, i) => Math.hypot(...GROUND.map((axis) => foot[axis] - before.feet[i][axis]))));
   }
 
   /** Nats of what lies outside its range. */

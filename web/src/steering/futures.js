@@ -1,13 +1,14 @@
 // A window of motion: K samples of the next few frames, pushed to what is asked, and the one of least energy. The
 // inside of motionlab/solvers/live_ways.py, a frame at a time, so that a page can do something else in between.
-import { clamp, STANDING, wrapped } from "../network/going.js";
+import { clamp, wrapped } from "../network/going.js";
 import { choose, nextNoise, point } from "../network/mixture.js";
 import { STILL } from "./aim.js";
+import { bound, READY, settle } from "./live_frame.js";
 
 export const WINDOW = 5; // frames that are decided at a time: the paper's
-const [SHARE, TURN, PACE] = [1, 1.2, 0.7]; // as network/going.js's; who steers waits for less
+const [SHARE, TURN, PACE] = [1, 1.2, 0.5]; // as network/going.js's; who steers waits for less
 const [HOLD, AGAINST] = [4, 1.2]; // of the speed that is left to who should stand, and m/s at most
-const [QUIET, DAMPED] = [0.3, 0.6]; // of the temperature that is left to them; of their bodies' moves that is taken
+const QUIET = 0.3; // of the temperature that is left to them
 const [SPEED, WAY, TURNING] = [0.15, 0.25, 0.5]; // m/s, rad, rad/s: how far futures may be off
 const [FEET, CALM] = [0.2, 0.1]; // weights of the terms of feet and poses, and of a body that should be still
 const ROOT = 6; // channels before those of joints
@@ -29,7 +30,7 @@ export function pushed(going, { speed, bend }) {
 
 export class Futures {
   /**
-   * `parts`: network, normalizer, feet (FeetEnergy); `before`: the state that is gone on from (input, hidden, cell, noise,
+   * `parts`: network, normalizer, stand (or null), feet (FeetEnergy); `before`: the state that is gone on from (input, hidden, cell, noise,
    * next), its `row` and `going`; `aim`; `settings`: futures, push, temperature, component_temperature, memory.
    */
   constructor(parts, before, aim, settings, random) {
@@ -61,14 +62,17 @@ export class Futures {
   draw(sample) {
     const { settings, random, normalizer: { kept, std }, columns, body, still } = this;
     const { going, next, input: before } = sample;
-    const push = pushed(going, this.aim.wanted(going, this.frame / going.fps));
+    const wanted = this.aim.wanted(going, this.frame / going.fps);
+    const push = pushed(going, wanted);
     const component = choose(next, random, settings);
     sample.noise = nextNoise(sample.noise, kept.length, random, settings);
     const temperature = settings.temperature * (still ? QUIET : 1);
     const input = point(next, component, sample.noise, { temperature });
     columns.forEach((column, i) => { input[column] += settings.push * push[i] / std[i]; });
-    const settling = still && going.pace < STANDING;
-    if (settling) for (let i = 0; i < input.length; i++) if (body[i]) input[i] -= DAMPED * (input[i] - before[i]);
+    if (settings.push > 0) {
+      bound(input, columns, this.normalizer, going, wanted);
+      if (still && going.pace < READY && wanted.off === 0) settle(input, before, body, this.stand); // else he turns
+    }
     sample.input = input;
     const row = this.denormalize(input);
     if (this.frame) for (let i = ROOT; i < input.length; i++) sample.moved += (going.fps * (input[i] - before[i])) ** 2;

@@ -5,6 +5,7 @@ import { Random } from "../network/mixture.js";
 import { Aim, STILL } from "./aim.js";
 import { within } from "./feet_energy.js";
 import { Futures, WINDOW } from "./futures.js";
+import { Gliding } from "./live_frame.js";
 
 const STRANGE = 20; // deviations of the data from their mean: no body is there
 const HASTE = 3; // deviations above the data's mean step: nobody is faster
@@ -17,22 +18,23 @@ export const fastestOf = ({ fps, normalizer: { mean, std } }) => fps * (mean[1] 
 
 export class LiveControl {
   /**
-   * `parts`: network, encoding, normalizer, normalize, denormalize, refiner (or none), feet (FeetEnergy), fps, fastest;
+   * `parts`: network, its `starts` and `layers` of numbers, encoding, normalizer, normalize, denormalize, refiner (or none),
+   * feet (FeetEnergy), stand (or null), fps, fastest;
    * `start` of weights.js; `place` {x, z, yaw}; `seed` of all chance.
    */
   constructor(parts, start, place, seed) {
     Object.assign(this, { parts, start, random: new Random(seed), frames: 0, askedAt: 0, lost: 0, tooFast: 0 });
     this.before = this.begin(place);
     this.aim = Aim.none(this.before.going);
+    this.gliding = new Gliding(parts);
     this.behind = { place, memory: parts.refiner?.begin(start.frame) };
     this.first = { row: this.refined(start.frame), place };
   }
 
   /** What is known at the start, at a place. */
   begin(place) {
-    const { network, normalize, fps } = this.parts;
+    const { network, normalize, layers, fps } = this.parts;
     const { frame, hidden, cell, noise } = this.start;
-    const layers = (numbers) => network.lstm.map(({ width, depth }) => numbers.slice(depth * width, (depth + 1) * width));
     const state = { input: normalize(frame), hidden: layers(hidden), cell: layers(cell), noise, row: frame };
     [state.next] = network.predict([state]);
     return { ...state, going: Going.of(fps, place, [frame]) };
@@ -69,6 +71,7 @@ export class LiveControl {
     const best = this.window.best();
     const { speed, way } = this.window.aim.way(this.before.going, 0);
     const asked = { speed, direction: way };
+    if (this.window.settings.push > 0) this.gliding.remind(best, this.before.row);
     this.window = null;
     if (this.apart(best)) this.again(best);
     this.before = { ...best, row: best.rows.at(-1) };

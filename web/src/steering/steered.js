@@ -26,7 +26,13 @@ export class Steered {
     const rows = normalizing(weights.normalizer);
     const refiner = weights.refiner && new Refiner(weights.refiner, encoding, rows);
     const network = new LstmGmm(weights.layers, weights.settings);
-    this.parts = { network, encoding, refiner, fps, fastest: this.fastest, normalizer: weights.normalizer, ...rows, feet: new FeetEnergy(encoding, fps, body) };
+    const stand = weights.starts.find(({ name }) => name === "stand");
+    this.parts = {
+      network, encoding, refiner, fps, ...rows, fastest: this.fastest, normalizer: weights.normalizer,
+      starts: weights.starts, stand: stand ? rows.normalize(stand.frame) : null,
+      layers: (numbers) => network.lstm.map(({ width, depth }) => numbers.slice(depth * width, (depth + 1) * width)),
+      feet: new FeetEnergy(encoding, fps, body),
+    };
     this.restart();
   }
 
