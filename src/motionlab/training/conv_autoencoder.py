@@ -44,7 +44,7 @@ class ConvAutoencoderPreset(Preset):
 # smoke: seconds, for tests. table: minutes. ship, paper: longer, the last in
 # windows as long as the paper's; how many updates it makes is not said there.
 _TABLE = ConvAutoencoderPreset(
-    updates=3_000, decay=1_500, batch=8, frames=64, validate_every=500, width=256, noise=0.0
+    updates=16_000, decay=6_000, batch=8, frames=64, validate_every=500, width=256, noise=0.0
 )
 PRESETS = {
     "conv-autoencoder": {
