@@ -2,8 +2,9 @@
 a memory of steps for who glides.
 
 A push may lead a network to where no data were, and there it runs on by itself: it was seen to glide
-at 9 m/s, asked for 1, until it came apart. So a frame is kept to what bodies do, and its step to what
-is asked and a stride's sway: whatever the network goes on from, it comes back as it was asked to.
+several times as fast as it was asked to, until it came apart. So a frame is kept to what bodies do,
+and its step to what is asked and a stride's sway: whatever the network goes on from, it comes back as
+it was asked to.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from .energy import Before
 from .guided import Going
 from .run_up import pick_start
 
-LIMIT = 4.0  # deviations of the data: of a step's and a turn's numbers 1 in 200 lies beyond
+LIMIT = 4.0  # deviations of the data: few steps and turns lie beyond
 SWAY, BRAKES = 0.4, 1.3  # m/s: that a stride sways; that is gone slower, sway aside: 3 m/s² or so
 SWING, SLOWER = 1.2, 2.0  # the same of a turn, rad/s
 ASIDE, BACK = 0.6, 0.2  # m/s at most: who is steered turns and goes ahead, and is not dragged
