@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 
 import numpy as np
 import pytest
 from tiny_lstm import tiny_clips, tiny_lstm
+from widget_pages import open_widget
 
 from motionlab import read_bvh
 from motionlab.metrics import root_path_error
 from motionlab.paths import Path
 from motionlab.viewer.live.draw_path_kernel import widget
 from motionlab.viewer.live.draw_path_page import page_figure
-from motionlab.viewer.live.player import STATIC, bundle_path
+from motionlab.viewer.live.player import bundle_path
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -23,22 +23,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
 <meta name="viewport" content="width=device-width"><title>path</title>
 <script src="player.js"></script><body style="margin: 8px">{}</body></html>"""
-# A kernel's side of the widget, as a page: it says what it is sent and can be told things.
-WIDGET = """<!doctype html><html lang="en"><link rel="icon" href="data:,"><title>path</title>
-<body style="margin: 8px"><div id="el"></div><script type="module">
-const traits = {traits}, heard = {{}};
-globalThis.sent = [];
-globalThis.tell = (message) => heard["msg:custom"].forEach((hear) => hear(message));
-const model = {{
-  get: (name) => traits[name],
-  on: (event, hear) => (heard[event] ??= []).push(hear),
-  off: () => {{}},
-  send: (message) => sent.push(message),
-}};
-{esm}
-widgetModule.render({{ model, el: document.getElementById("el") }});
-globalThis.figure = document.getElementById("el").motionlab;
-</script></body></html>"""
 CORNERS = [[0, 0], [0, 3], [2, 3]]
 
 
@@ -287,17 +271,7 @@ def test_a_phone_shows_all_of_it(visit, scheme):
 def kernel_page(visit, folder, model, clips):
     """The widget's page, and what a kernel would answer: {frames, whole} of a clip."""
     made = widget(model, lambda: None, (), 1.2, "RNN", "Draw", 200)
-    traits = {"kind": "path", "content": made.content, "caption": "Draw"}
-    esm = (STATIC / "widget.js").read_text(encoding="utf-8")
-    end = esm.rindex("export{")
-    name = esm[end:].split("{")[1].split(" as ")[0]
-    esm = f"{esm[:end]}\nconst widgetModule = {name};"
-    page = WIDGET.format(
-        traits=json.dumps(traits).replace("<", "\\u003c"), esm=esm.replace("</script", "<\\/script")
-    )
-    (folder / "widget.html").write_text(page, encoding="utf-8")
-    opened = visit("widget.html")
-    opened.page.wait_for_function("globalThis.figure")
+    opened = open_widget(visit, folder, made)
     answers = [made._shown(clips[0][k : k + 17]) for k in (0, 17)], made._shown(clips[1][:40])
     return opened.page, *answers
 

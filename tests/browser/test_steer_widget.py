@@ -2,37 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
 from tiny_lstm import tiny_clips, tiny_lstm
+from widget_pages import open_widget
 
 from motionlab.solvers.live_control import LiveControl
-from motionlab.viewer.live.player import STATIC
 from motionlab.viewer.live.steer_kernel import widget
 from motionlab.viewer.live.steer_settings import Look
 
 pytest.importorskip("check_book", exc_type=ImportError)
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-# A kernel's side of the widget, as a page: it says what it is sent and can be told things.
-WIDGET = """<!doctype html><html lang="en"><meta charset="utf-8"><link rel="icon" href="data:,"><title>steer</title>
-<body style="margin: 8px"><div id="el"></div><script type="module">
-const traits = {traits}, heard = {{}};
-globalThis.sent = [];
-globalThis.tell = (message) => heard["msg:custom"].forEach((hear) => hear(message));
-const model = {{
-  get: (name) => traits[name],
-  on: (event, hear) => (heard[event] ??= []).push(hear),
-  off: () => {{}},
-  send: (message) => sent.push(structuredClone(message)),
-}};
-{esm}
-widgetModule.render({{ model, el: document.getElementById("el") }});
-globalThis.figure = document.getElementById("el").motionlab;
-</script></body></html>"""
 PATIENCE = 60_000  # milliseconds
 
 
@@ -47,17 +30,7 @@ def kernel_page(visit, folder):
     tiny = tiny_lstm(tiny_clips("walk_1.2", "run_3.0", "stand"))
     tiny.sampling = {"temperature": 0.3}
     made = widget(tiny, LiveControl, None, (), Look(1.2, 4, 240, "#d98324"), "Steered")
-    traits = {"kind": "steer", "content": made.content, "caption": "Steered"}
-    esm = (STATIC / "widget.js").read_text(encoding="utf-8")
-    end = esm.rindex("export{")
-    name = esm[end:].split("{")[1].split(" as ")[0]
-    esm = f"{esm[:end]}\nconst widgetModule = {name};"
-    page = WIDGET.format(
-        traits=json.dumps(traits).replace("<", "\\u003c"), esm=esm.replace("</script", "<\\/script")
-    )
-    (folder / "widget.html").write_text(page, encoding="utf-8")
-    opened = visit("widget.html")
-    opened.page.wait_for_function("globalThis.figure")
+    opened = open_widget(visit, folder, made)
     told: list[dict] = []
     made.send = told.append
 

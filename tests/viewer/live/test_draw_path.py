@@ -25,18 +25,6 @@ CORNERS = [[0, 0], [0, 3], [2, 3]]
 
 
 @pytest.fixture(scope="module")
-def clips():
-    return tiny_clips("walk_1.2", "run_3.0", "stand")
-
-
-@pytest.fixture(scope="module")
-def model(clips):
-    model = tiny_lstm(clips)
-    model.sampling = {"temperature": 0.5}
-    return model
-
-
-@pytest.fixture(scope="module")
 def solved(clips):
     record = {"timing": {"asked (m/s)": 9.0}, "start": "run_3.0"}
     return [

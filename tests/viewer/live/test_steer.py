@@ -21,18 +21,6 @@ from motionlab.viewer.live.steer_kernel import SteerWidget
 
 
 @pytest.fixture(scope="module")
-def clips():
-    return tiny_clips("walk_1.2", "run_3.0", "stand")
-
-
-@pytest.fixture(scope="module")
-def model(clips):
-    model = tiny_lstm(clips)
-    model.sampling = {"temperature": 0.5}
-    return model
-
-
-@pytest.fixture(scope="module")
 def refiner(model):
     return Refiner(model.encoding, model.normalizer, width=20).requires_grad_(False)
 
