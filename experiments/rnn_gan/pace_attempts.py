@@ -37,7 +37,7 @@ DATA = {
     "lstm-gmm-contacts": "locomotion",
     "lstm-gmm-permissive": "runs/locomotion-permissive.npz",
 }
-MORE = {"updates": 1_000, "decay": 1_000, "learning_rate": 1e-3}  # of training, from what ships
+MORE = {"updates": 400, "decay": 400, "learning_rate": 1e-3}  # of training, from what ships
 SHIPS = "as it ships"
 DRAWN: dict[str, dict] = {
     SHIPS: {},
