@@ -22,16 +22,16 @@ from torch.nn import functional
 
 from ..errors import ModelError
 from .noise import noise_to_draw, normal
-from .sampler_few import Few, Linear, Product, gates_in_order, rounded, whole
+from .sampler_few import Few, Product, gates_in_order, half, in_steps, int8, whole
 from .state import State
 from .unchanged import made_of
 
 if TYPE_CHECKING:
     from .lstm_gmm import LstmGmm
 
-BLOCK = 32  # numbers that a product of whole weights takes at a time
 FEW = 4  # characters for whom reading the weights takes longer than multiplying
 FEW_IN_FULL = 16  # characters whom numpy serves faster than torch, with weights in full
+Linear = Callable[[Tensor], Tensor]  # a product: (batch, in) -> (batch, out)
 Memory = tuple[Tensor, Tensor, Tensor, Tensor]  # h, C, noise and seen after the last frame
 
 
@@ -164,10 +164,10 @@ def _see(enter: list[Linear], seen: Tensor, hidden: list[Tensor], cell: list[Ten
 
 def _lstm(gates: Tensor, cell: Tensor) -> tuple[Tensor, Tensor]:
     """New h and C (batch, width) of a layer from its `gates_in_order` (batch, 4 width), bent by tanh."""
-    width = cell.shape[1]
-    enter, keep, show = gates[:, : 3 * width].add_(1).chunk(3, 1)  # twice their sigmoids
-    cell = (keep * cell).add_(enter.mul_(gates[:, 3 * width :])).mul_(0.5)
-    return cell.tanh().mul_(show).mul_(0.5), cell
+    enter, keep, show, new = gates.chunk(4, 1)  # half of each sigmoid's argument, bent by tanh
+    cell = cell.addcmul(keep, cell).addcmul_(enter, new).add_(new).mul_(0.5)
+    out = cell.tanh()
+    return out.addcmul_(show, out).mul_(0.5), cell
 
 
 def _products(model: LstmGmm, precision: str, few: bool) -> list[Linear] | list[Product]:
@@ -176,10 +176,8 @@ def _products(model: LstmGmm, precision: str, few: bool) -> list[Linear] | list[
     Rounding or turning weights takes as long as drawing some seconds of one character. So what was made
     of them is kept for as long as the model lives and its weights do not change.
     """
-    make, name = PRECISIONS[precision], precision
-    if few:
-        make, name = whole if precision == "full" else rounded(make), f"{precision}, few"
-    return made_of(model, name, lambda: _made(model, make))
+    make = (FOR_FEW if few else PRECISIONS)[precision]
+    return made_of(model, f"{precision}, {make.__name__}", lambda: _made(model, make))
 
 
 def _made(model: LstmGmm, make: Callable[..., Linear | Product]) -> list[Linear] | list[Product]:
@@ -211,16 +209,11 @@ def _int8(weight: Tensor, bias: Tensor, bend: str = "none") -> Linear:
     Not 256: older processors add products in pairs, in 16 bits, and 2 * 127 * 127 is what fits.
     The step of the inputs is chosen anew each time, by the largest and the smallest in the batch.
     """
-    low, high = weight.aminmax(dim=1)
-    scale = torch.maximum(high, -low).clamp(min=1e-12) / 127
-    whole = (weight / scale[:, None]).round_().to(torch.int8)
-    packed = torch.ops.onednn.qlinear_prepack(whole, None)
+    steps, scale = in_steps(weight)
+    packed = torch.ops.onednn.qlinear_prepack(steps, None)
     zeros = torch.zeros(len(scale), dtype=torch.int32)
-    for_few = _int8_for_few(whole, scale, bias)
 
     def product(inputs: Tensor) -> Tensor:
-        if len(inputs) <= FEW:
-            return _BENT[bend](for_few(inputs))
         low, high = (edge.item() for edge in inputs.aminmax())
         if not math.isfinite(high - low):
             raise ModelError(
@@ -229,30 +222,12 @@ def _int8(weight: Tensor, bias: Tensor, bend: str = "none") -> Linear:
             )
         step = max(high - low, 1e-6) / 127
         zero = round(-low / step)
-        half = inputs.new_tensor(zero + 0.5)  # conversion cuts off what is behind the point
+        middle = inputs.new_tensor(zero + 0.5)  # conversion cuts off what is behind the point
         # as int8, which holds them as well, and to which torch converts in a quarter of the time
-        steps = torch.add(half, inputs, alpha=1 / step).to(torch.int8).view(torch.uint8)
+        steps = torch.add(middle, inputs, alpha=1 / step).to(torch.int8).view(torch.uint8)
         return torch.ops.onednn.qlinear_pointwise(
             steps, step, zero, packed, scale, zeros, bias, 1.0, 0, torch.float32, bend, [], ""
         )
-
-    return product
-
-
-def _int8_for_few(whole: Tensor, scale: Tensor, bias: Tensor) -> Linear:
-    """The same weights for characters who wait for them, and not for the products.
-
-    Inputs and sums are bfloat16 then, eight bits each: there is nothing to choose by the batch.
-    """
-    rows, columns = whole.shape
-    beyond = -columns % BLOCK  # the product reads on to the end of a block
-    whole = functional.pad(whole, (0, beyond, 0, -rows % BLOCK))
-    ones = torch.ones(len(whole), dtype=torch.bfloat16)  # scales; ours have more digits
-
-    def product(inputs: Tensor) -> Tensor:
-        short = (functional.pad(inputs, (0, beyond)) if beyond else inputs).bfloat16()
-        sums = torch._weight_int8pack_mm(short, whole, ones)
-        return torch.addcmul(bias, sums if rows == len(whole) else sums[:, :rows], scale)
 
     return product
 
@@ -265,3 +240,4 @@ def can_round(tensor: Tensor) -> bool:
 
 
 PRECISIONS = {"full": _full, "half": _half, "int8": _int8}
+FOR_FEW = {"full": whole, "half": half, "int8": int8}  # the same in numpy

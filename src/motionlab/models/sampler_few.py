@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 if TYPE_CHECKING:
     from .lstm_gmm import LstmGmm
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from .state import State
 
 Product = Callable[[np.ndarray], np.ndarray]  # (batch, in) -> (batch, out)
-Linear = Callable[[Tensor], Tensor]  # the same of tensors
+BLOCK = 32  # numbers that a product of whole weights takes at a time
 SMALL = 200_000  # weights; fewer are read in less time than torch takes to round what they meet
 _HALF = np.array([0.5], np.float32)  # as an array: of a number numpy asks each time what it is
 
@@ -39,16 +40,46 @@ def whole(weight: Tensor, bias: Tensor, bend: str = "none") -> Product:
     return lambda inputs: bent(inputs @ across + bias)
 
 
-def rounded(make: Callable[..., Linear]) -> Callable[..., Product]:
-    """Products as `make` makes them for tensors; small ones stay in full, which is faster."""
+def half(weight: Tensor, bias: Tensor, bend: str = "none") -> Product:
+    """A product with weights in half precision; small ones stay in full, which is faster."""
+    if weight.numel() < SMALL:
+        return whole(weight, bias, bend)
+    packed, bent = torch.ops.quantized.linear_prepack_fp16(weight, bias), _BENT[bend]
+    linear = torch.ops.quantized.linear_dynamic_fp16
+    return lambda inputs: bent(linear(torch.from_numpy(inputs), packed).numpy())
 
-    def made(weight: Tensor, bias: Tensor, bend: str = "none") -> Product:
-        if weight.numel() < SMALL:
-            return whole(weight, bias, bend)
-        linear, bent = make(weight, bias), _BENT[bend]
-        return lambda inputs: bent(linear(torch.from_numpy(inputs)).numpy())
 
-    return made
+def int8(weight: Tensor, bias: Tensor, bend: str = "none") -> Product:
+    """A product with weights as whole numbers; small ones stay in full, which is faster.
+
+    Inputs and sums are bfloat16, eight bits each: there is nothing to choose by the batch.
+    """
+    if weight.numel() < SMALL:
+        return whole(weight, bias, bend)
+    steps, scale = in_steps(weight)
+    rows, columns = steps.shape
+    beyond = -columns % BLOCK  # the product reads on to the end of a block
+    steps = functional.pad(steps, (0, beyond, 0, -rows % BLOCK))
+    ones = torch.ones(len(steps), dtype=torch.bfloat16)  # scales; ours have more digits
+    scale, bias, bent = scale.numpy(), bias.detach().numpy(), _BENT[bend]
+
+    def product(inputs: np.ndarray) -> np.ndarray:
+        short = torch.from_numpy(inputs).bfloat16()
+        if beyond:
+            short = functional.pad(short, (0, beyond))
+        sums = torch._weight_int8pack_mm(short, steps, ones).float().numpy()[:, :rows]
+        sums *= scale
+        sums += bias
+        return bent(sums)
+
+    return product
+
+
+def in_steps(weight: Tensor) -> tuple[Tensor, Tensor]:
+    """Weights (out, in) as whole numbers, each row in 255 steps, and the steps (out)."""
+    low, high = weight.detach().aminmax(dim=1)
+    scale = torch.maximum(high, -low).clamp(min=1e-12) / 127
+    return (weight.detach() / scale[:, None]).round_().to(torch.int8), scale
 
 
 def gates_in_order(rows: Tensor) -> Tensor:
