@@ -22,8 +22,9 @@ export class PageSource {
     return new Steered(weights, live.look, body, settings, cast);
   }
 
-  cost({ cost, fps, cast }) {
+  cost({ cost, fps, cast, latency }) {
     const slow = cost > (SHARE * 1000) / fps ? " That is too much for this machine, and time passes slower" + (cast[0].futures ? "." : ": take fewer futures.") : "";
-    return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame.${slow}`;
+    const [least, most] = latency.map((seconds) => seconds.toFixed(2));
+    return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame. A wish is seen after ${least} to ${most} s.${slow}`;
   }
 }

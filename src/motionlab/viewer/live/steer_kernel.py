@@ -35,8 +35,6 @@ TERMS = {  # of solvers.live_control's gradient, by name
     "resting": "slow feet rest",
     "poses": "joints keep their range",
 }
-LOCK = Control("lock", "Hold feet still", "Toes in contact are held where they are; five frames late",
-               0, 1, 1, 1)  # fmt: skip
 GRADIENT = Control("gradient", "A gradient, too", "The paper's way: from the best future down the "
                    "slope of all terms below; slower", 0, 1, 1, 0)  # fmt: skip
 FEWEST = 1e-3  # temperature
@@ -100,7 +98,7 @@ class SteerWidget(anywidget.AnyWidget):
             control(
                 model, int(settings["start"]), futures=futures, seed=int(settings["seed"]),
                 refiner=refiner if settings.get("refined", 1) else None,
-                lock=bool(settings["lock"]), places=[[-1.5 * k, 0.0, 0.0]],
+                lock=bool(settings.get("lock")), places=[[-1.5 * k, 0.0, 0.0]],
             )
             for k, futures in enumerate(several)
         ]  # fmt: skip
@@ -176,7 +174,7 @@ def widget(
         )
     controls = [
         *(each for each in controls_of(model, look, refiner) if each["name"] not in ("help", "push")),
-        *(vars(each) for each in (LOCK, GRADIENT)),
+        vars(GRADIENT),
         *(vars(Control(f"term {name}", f"Term: {TERMS[name]}", "Whether the gradient minds it",
                        0, 1, 1, 1)) for name in _terms_of(model)),
     ]  # fmt: skip
