@@ -185,6 +185,27 @@ def test_without_its_weights_it_says_so(browser, folder):
     window.close()
 
 
+def test_on_a_phone_stick_and_main_settings_are_in_reach_of_who_sees_him(visit):
+    page = visit(viewport={"width": 390, "height": 844}, has_touch=True).page
+    load(page)
+    boxes = [
+        page.get_by_label(name, exact=True).bounding_box()
+        for name in ("Speed (m/s)", "Direction (°)", "Keep going", "Help", "Lock the feet")
+    ]
+    view = page.locator(".ml-view").bounding_box()
+    assert view["y"] >= 0 and max(box["y"] + box["height"] for box in boxes) < 844
+    assert not page.get_by_label("Seed").is_visible()
+    page.get_by_text("More settings").click()
+    page.get_by_label("Seed").evaluate("field => field.scrollIntoView({ block: 'end' })")
+    assert page.evaluate("scrollY") > 0
+    seen = page.locator(".ml-view"), page.locator(".ml-stick"), page.get_by_label("Seed")
+    for part in seen:  # he stays in sight, and nothing hides what is set
+        box = part.bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] < 845
+    view = seen[0].bounding_box()
+    assert seen[2].bounding_box()["y"] > view["y"] + view["height"]
+
+
 @pytest.mark.parametrize("name", ["page.html", "beside.html"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_phone_shows_all_of_it(visit, name, scheme):
