@@ -84,9 +84,8 @@ export class SteerFigure {
 
   setLive(live) {
     this.go.hidden = live;
-    this.course.element.hidden = !live || !this.source.leads;
     this.stage.classList.toggle("ml-steered", live);
-    for (const part of [this.told, this.inside, this.more, ...Object.values(this.fields)]) part.hidden = !live;
+    for (const part of [this.told, this.inside, this.more, this.course.element, ...Object.values(this.fields)]) part.hidden = !live;
   }
 
   show(build) {

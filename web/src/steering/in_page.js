@@ -9,7 +9,6 @@ const PACE = 1.2; // m/s, of a start that nobody chose
 export class PageSource {
   ready = false; // nothing is loaded until a reader asks for it
   looks = true; // the network can be looked into
-  leads = true; // along a line that is drawn
 
   invitation({ live }) {
     return `Load the network (${live.megabytes} MB)`;
