@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from steered_pages import PATIENCE, frames_pass, load, until, value, write_pages
+from steered_pages import PATIENCE, SECOND, frames_pass, load, until, value, write_pages
 
 from motionlab import read_bvh
 
@@ -51,6 +51,65 @@ def test_commands_that_change_every_frame_are_heard(visit):
             }}"""
         )
         assert said in told, wrong
+
+
+def test_who_is_asked_for_what_nobody_can_do_does_what_he_can_and_says_so(visit):
+    page = visit().page
+    load(page)
+    page.get_by_role("button", name="Pause").click()
+    aim, notes, rows = page.evaluate(
+        """() => {
+          const { steered } = document.querySelector("figure").motionlab;
+          steered.steer({ speed: 100, direction: 1e9 });
+          steered.reach(steered.last + 60);
+          const { aim: { speed, direction } } = steered.characters[0];
+          return [[speed, direction, steered.fastest], steered.records[0].notes, [...steered.tracks[0].at(1e9).row]];
+        }"""
+    )
+    assert aim[0] == aim[2] < 10 and abs(aim[1]) <= math.pi
+    assert "100.0 m/s is faster than anybody" in notes[0]
+    assert all(math.isfinite(number) for number in rows)
+
+
+def test_who_is_asked_nothing_for_longer_than_is_kept_takes_no_more_room(visit):
+    page = visit().page
+    load(page)
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_label("Futures (K)").fill("1")
+    for _ in range(9):
+        page.evaluate(
+            """() => {
+              const { steered } = document.querySelector("figure").motionlab;
+              steered.steer({ speed: 0, direction: 0 });
+              steered.reach(steered.last + 500);
+            }"""
+        )
+    assert value(page, "steered.last") > 120 * SECOND
+    assert value(page, "steered.tracks[0].frames.length") == 120 * SECOND
+    assert value(page, "steered.characters[0].lost") == 0
+    assert value(page, "steered.tracks[0].oldest") > 0  # the beginning is gone
+
+
+def test_two_figures_of_a_page_are_steered_one_at_a_time(visit, folder):
+    one = (folder / "page.html").read_text(encoding="utf-8")
+    figure = one[one.index("<figure") : one.index("</figure>") + len("</figure>")]
+    (folder / "two.html").write_text(one.replace(figure, figure + figure), encoding="utf-8")
+    page = visit("two.html").page
+    for number in (0, 1):
+        page.locator("figure").nth(number).get_by_role("button", name="Load the network").click()
+        page.wait_for_function(
+            f"document.querySelectorAll('figure[data-live]').length === {number + 1}",
+            timeout=PATIENCE,
+        )
+    hands = (
+        "[...document.querySelectorAll('figure')].map((one) => one.motionlab.commands.hand.join())"
+    )
+    page.keyboard.down("KeyW")  # the newest has the focus
+    assert page.evaluate(hands) == ["0,0", "0,1"]
+    page.locator("figure").nth(0).get_by_label("Help", exact=True).click()
+    assert page.evaluate(hands) == ["0,0", "0,0"]  # let go with the focus
+    page.keyboard.down("KeyA")
+    assert page.evaluate(hands) == ["1,0", "0,0"]
 
 
 def test_who_comes_apart_begins_again(visit):

@@ -181,6 +181,7 @@ def test_who_is_far_from_a_line_goes_to_its_beginning_and_then_along_it(asked):
     assert int(made.live[0].aim.which[0]) == -1
     for _ in range(60):
         (last,) = ask(wish={"speed": 1.2, "line": line}, lock=0)["characters"]
+        assert abs(last["asked"]["direction"]) <= math.pi
     assert int(made.live[0].aim.which[0]) == 0 and float(made.live[0].aim.arcs[0]) > 1
     assert math.hypot(last["places"][-1][0] - 1, last["places"][-1][1] - 6) < 1.2
     ask(wish={"speed": 1.2, "direction": 0.0}, lock=0)

@@ -108,7 +108,9 @@ export class KernelSource {
   cost({ cost, fps, latency }) {
     if (this.failed) return this.failed;
     const [least, most] = latency.map((seconds) => seconds.toFixed(2));
-    return `The kernel makes ${Math.round(1000 / Math.max(cost, 1e-3))} frames a second; ${fps} are needed. A wish is seen after ${least} to ${most} s.`;
+    const made = Math.round(1000 / Math.max(cost, 1e-3));
+    const slow = made < fps ? " Time passes slower." : "";
+    return `The kernel makes ${made} frames a second; ${fps} are needed. A wish is seen after ${least} to ${most} s.${slow}`;
   }
 
   dispose() {

@@ -186,7 +186,8 @@ def _asked(live: Any) -> dict[str, float]:
     if int(aim.which[0]) < 0:
         return {"speed": float(aim.speed[0]), "direction": float(aim.direction[0])}
     speed, _, off = aim.wanted(going)
-    return {"speed": float(speed[0]), "direction": float(going.bearing()[0]) + float(off[0])}
+    way = float(going.bearing()[0]) + float(off[0])
+    return {"speed": float(speed[0]), "direction": math.remainder(way, 2 * math.pi)}
 
 
 def widget(
