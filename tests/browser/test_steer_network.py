@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from steered_pages import PATIENCE, frames_pass, load, until, value, write_pages
+from steered_pages import PATIENCE, SECOND, frames_pass, load, until, value, write_pages
 
 from motionlab import read_bvh
 
@@ -51,6 +51,65 @@ def test_commands_that_change_every_frame_are_heard(visit):
             }}"""
         )
         assert said in told, wrong
+
+
+def test_who_is_asked_for_what_nobody_can_do_does_what_he_can_and_says_so(visit):
+    page = visit().page
+    load(page)
+    page.get_by_role("button", name="Pause").click()
+    aim, notes, rows = page.evaluate(
+        """() => {
+          const { steered } = document.querySelector("figure").motionlab;
+          steered.steer({ speed: 100, direction: 1e9 });
+          steered.reach(steered.last + 60);
+          const { aim: { speed, direction } } = steered.characters[0];
+          return [[speed, direction, steered.fastest], steered.records[0].notes, [...steered.tracks[0].at(1e9).row]];
+        }"""
+    )
+    assert aim[0] == aim[2] < 10 and abs(aim[1]) <= math.pi
+    assert "100.0 m/s is faster than anybody" in notes[0]
+    assert all(math.isfinite(number) for number in rows)
+
+
+def test_who_is_asked_nothing_for_longer_than_is_kept_takes_no_more_room(visit):
+    page = visit().page
+    load(page)
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_label("Futures (K)").fill("1")
+    for _ in range(9):
+        page.evaluate(
+            """() => {
+              const { steered } = document.querySelector("figure").motionlab;
+              steered.steer({ speed: 0, direction: 0 });
+              steered.reach(steered.last + 500);
+            }"""
+        )
+    assert value(page, "steered.last") > 120 * SECOND
+    assert value(page, "steered.tracks[0].frames.length") == 120 * SECOND
+    assert value(page, "steered.characters[0].lost") == 0
+    assert value(page, "steered.tracks[0].oldest") > 0  # the beginning is gone
+
+
+def test_two_figures_of_a_page_are_steered_one_at_a_time(visit, folder):
+    one = (folder / "page.html").read_text(encoding="utf-8")
+    figure = one[one.index("<figure") : one.index("</figure>") + len("</figure>")]
+    (folder / "two.html").write_text(one.replace(figure, figure + figure), encoding="utf-8")
+    page = visit("two.html").page
+    for number in (0, 1):
+        page.locator("figure").nth(number).get_by_role("button", name="Load the network").click()
+        page.wait_for_function(
+            f"document.querySelectorAll('figure[data-live]').length === {number + 1}",
+            timeout=PATIENCE,
+        )
+    hands = (
+        "[...document.querySelectorAll('figure')].map((one) => one.motionlab.commands.hand.join())"
+    )
+    page.keyboard.down("KeyW")  # the newest has the focus
+    assert page.evaluate(hands) == ["0,0", "0,1"]
+    page.locator("figure").nth(0).get_by_label("Help", exact=True).click()
+    assert page.evaluate(hands) == ["0,0", "0,0"]  # let go with the focus
+    page.keyboard.down("KeyA")
+    assert page.evaluate(hands) == ["1,0", "0,0"]
 
 
 def test_who_comes_apart_begins_again(visit):
@@ -183,6 +242,27 @@ def test_without_its_weights_it_says_so(browser, folder):
     page.get_by_text("not beside this page").wait_for(timeout=PATIENCE)
     assert page.get_by_role("button", name="Load the network").is_enabled()
     window.close()
+
+
+def test_on_a_phone_stick_and_main_settings_are_in_reach_of_who_sees_him(visit):
+    page = visit(viewport={"width": 390, "height": 844}, has_touch=True).page
+    load(page)
+    boxes = [
+        page.get_by_label(name, exact=True).bounding_box()
+        for name in ("Speed (m/s)", "Direction (°)", "Keep going", "Help", "Lock the feet")
+    ]
+    view = page.locator(".ml-view").bounding_box()
+    assert view["y"] >= 0 and max(box["y"] + box["height"] for box in boxes) < 844
+    assert not page.get_by_label("Seed").is_visible()
+    page.get_by_text("More settings").click()
+    page.get_by_label("Seed").evaluate("field => field.scrollIntoView({ block: 'end' })")
+    assert page.evaluate("scrollY") > 0
+    seen = page.locator(".ml-view"), page.locator(".ml-stick"), page.get_by_label("Seed")
+    for part in seen:  # he stays in sight, and nothing hides what is set
+        box = part.bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] < 845
+    view = seen[0].bounding_box()
+    assert seen[2].bounding_box()["y"] > view["y"] + view["height"]
 
 
 @pytest.mark.parametrize("name", ["page.html", "beside.html"])

@@ -113,6 +113,61 @@ def test_keys_act_while_the_picture_has_the_focus_and_only_then(visit):
     assert value(page, "commands.hand") == [0, 0]
 
 
+def test_keys_steer_again_after_a_click_on_anything_below_the_picture(visit):
+    page = visit().page
+    load(page)
+
+    def steers(*keys: str) -> list[bool]:
+        found = []
+        for key in keys:
+            page.keyboard.down(key)
+            found.append(value(page, "commands.hand") != [0, 0])
+            page.keyboard.up(key)
+            assert value(page, "commands.hand") == [0, 0]
+        return found
+
+    for control in ("Help", "Keep going"):
+        page.get_by_label(control, exact=True).click()
+        assert steers("ArrowUp", "KeyA") == [True, True], control
+    page.get_by_text("Lock the feet").click()
+    page.get_by_role("button", name="Save the last").click()
+    assert steers("ArrowLeft") == [True]
+    page.get_by_label("Speed (m/s)").click(position={"x": 40, "y": 18})  # by mouse
+    assert steers("ArrowRight") == [True]
+    page.get_by_text("Draw a line, and he goes along it").click()
+    assert steers("ArrowDown") == [True]
+    page.locator(".ml-told").click()
+    assert steers("ArrowUp") == [True]
+    page.get_by_label("Start", exact=True).select_option("walk_1.2")
+    assert value(page, "settings.start") == 0
+
+
+def test_who_comes_to_a_slider_by_tab_moves_it_by_arrows_and_steers_by_letters(visit):
+    page = visit().page
+    load(page)
+    slider = page.get_by_label("Speed (m/s)")
+    page.keyboard.press("Tab")
+    while not slider.evaluate("slider => slider === document.activeElement"):
+        page.keyboard.press("Tab")
+    speed = value(page, "settings.speed")
+    page.keyboard.press("ArrowRight")
+    assert value(page, "settings.speed") > speed and value(page, "commands.hand") == [0, 0]
+    page.keyboard.down("KeyW")
+    assert value(page, "commands.hand") == [0, 1]
+    page.keyboard.up("KeyW")
+    page.keyboard.press("Tab")
+    page.get_by_label("Help", exact=True).focus()
+    page.keyboard.press("Space")  # by keyboard: he stays, and arrows steer all the same
+    assert page.get_by_label("Help", exact=True).evaluate("tick => tick === document.activeElement")
+    page.keyboard.down("ArrowUp")
+    assert value(page, "commands.hand") == [0, 1]
+    page.get_by_label("Seed").focus()
+    assert value(page, "commands.hand") == [0, 0]  # a field has a use for it
+    page.keyboard.up("ArrowUp")
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.tagName") == "CANVAS"
+
+
 @pytest.mark.parametrize("leave", ["blur", "visibilitychange"])
 def test_keys_are_let_go_when_window_or_tab_goes(visit, leave):
     page = visit().page

@@ -80,3 +80,47 @@ def test_a_kernel_begins_again_and_says_what_went_wrong(kernel_page):
     run = page.evaluate("figure.steered.run")
     page.evaluate("message => tell(message)", {"run": run, "failed": "It was too cold."})
     page.get_by_text("It was too cold.").wait_for(timeout=PATIENCE)
+
+
+def test_he_goes_along_a_line_that_is_drawn_with_the_mouse(kernel_page):
+    """To its beginning first, then along it; a key takes him off it."""
+    page, answer, made = kernel_page
+    answer()
+    page.wait_for_function("figure.steered?.last === 4", timeout=PATIENCE)
+    page.get_by_text("Draw a line, and he goes along it").click()
+    board = page.locator(".ml-board")
+    board.scroll_into_view_if_needed()
+    box = board.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, 11):
+        page.mouse.move(x + 8 * step, y - 4 * step)
+    page.mouse.up()
+    page.get_by_text("he goes to where it begins").wait_for(timeout=PATIENCE)
+    drawn = page.evaluate("figure.commands.path.drawn")
+    for _ in range(30):
+        message = answer()
+        if made._lines == [drawn]:
+            break
+    assert message["wish"] == {"speed": 1.2, "line": drawn}
+    arcs = []
+    for _ in range(6):
+        answer()
+        arcs.append(float(made.live[0].aim.arcs[0]))
+    assert arcs == sorted(arcs) and arcs[-1] > arcs[0]  # he goes on, and does not begin again
+    page.keyboard.down("ArrowUp")
+    answer()  # on its way before
+    answer()
+    assert made._lines == [None] and int(made.live[0].aim.which[0]) == -1
+
+
+def test_after_a_refusal_the_kernel_is_asked_again(kernel_page):
+    page, answer, _ = kernel_page
+    answer()
+    page.wait_for_function("figure.steered?.last === 4 && sent.length === 1", timeout=PATIENCE)
+    run = page.evaluate("sent.shift().run")
+    page.evaluate("message => tell(message)", {"run": run, "failed": "It leads nowhere."})
+    page.get_by_text("It leads nowhere.").wait_for(timeout=PATIENCE)
+    answer()
+    page.wait_for_function("figure.steered.last === 9", timeout=PATIENCE)

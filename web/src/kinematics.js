@@ -53,6 +53,19 @@ export function fromVector(x, y, z) {
   ];
 }
 
+/** The rotation vector of a matrix, at most half a turn long. */
+export function toVector([a, b, c, d, e, f, g, h, i]) {
+  const axis = [h - f, c - g, d - b]; // as long as twice the sine
+  const sine = Math.hypot(...axis) / 2;
+  const cosine = (a + e + i - 1) / 2;
+  const angle = Math.atan2(sine, cosine);
+  if (sine > 1e-8 || cosine > 0) return axis.map((value) => value * (sine > 1e-8 ? angle / (2 * sine) : 0.5));
+  // half a turn: the matrix and one more are twice the axis by itself, whose longest column tells it best
+  const columns = [[a + 1, d, g], [b, e + 1, h], [c, f, i + 1]];
+  const best = columns[[a, e, i].indexOf(Math.max(a, e, i))];
+  return best.map((value) => (Math.PI * value) / Math.hypot(...best));
+}
+
 export function product(a, b, result) {
   for (let row = 0; row < 9; row += 3) {
     for (let column = 0; column < 3; column++) {

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import torch
@@ -99,6 +100,23 @@ class LockStream:
         self._settle = round(SETTLE * fps)
         most = self._rules.sure
         self._bell = [math.comb(most, k) / 2**most for k in range(most + 1)]
+
+    @property
+    def known(self) -> dict[str, Any]:
+        """What is known before the first frame, fit for JSON: what web/src/feet/lock_stream.js goes by.
+
+        "joints" of the whole skeleton, for each part of a leg the left and the right one; "fronts" of
+        knees, in the frames of thighs; heights "flat" of resting toes; the others are frames.
+        """
+        kept = np.array(self._kept)
+        return {
+            "joints": kept[self._points].tolist(),
+            "fronts": self._front[..., 0].tolist(),
+            "flat": self._flat,
+            "ahead": self.ahead,
+            "settle": self._settle,
+            "rules": vars(self._rules),
+        }
 
     # -- frames in and out --------------------------------------------------------------------
 

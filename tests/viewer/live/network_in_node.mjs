@@ -1,6 +1,8 @@
 // Runs web/src/network/ as a page would, for network_in_node.py: answers the questions in a JSON file.
 import { readFileSync } from "node:fs";
 import { smoothed } from "../../../web/src/drawing/shapes.js";
+import { LockStream } from "../../../web/src/feet/lock_stream.js";
+import { fromVector, toVector } from "../../../web/src/kinematics.js";
 import { decode } from "../../../web/src/motion.js";
 import { Linear } from "../../../web/src/network/affine.js";
 import { Dreamer } from "../../../web/src/network/dreamer.js";
@@ -196,18 +198,35 @@ const answers = {
         const next = (which) => left[which][at[which]++];
         steered.characters[0].random = { uniform: () => next("uniform"), normal: () => next("noise") };
       }
-      steered.reach(frame + 5);
+      const before = steered.last;
+      while (steered.characters[0].frames < frame + 5) steered.work();
       steered.characters.forEach((character, k) => {
-        const shown = [1, 2, 3, 4, 5].map((t) => steered.tracks[k].at(frame + t));
+        const shown = Array.from({ length: steered.last - before }, (_, t) => steered.tracks[k].at(before + 1 + t)); // a lock waits
         const { x, z, yaw } = character.before.going.place;
         said[k].rows.push(...shown.map(({ row }) => list(row)));
         said[k].places.push(...shown.map(({ place }) => [place.x, place.z, place.yaw]));
         said[k].drawn.push([x, z, yaw]);
-        said[k].chosen.push(shown[0].chosen);
+        if (shown.length) said[k].chosen.push(shown[0].chosen);
         said[k].notes = character.record.notes;
       });
     }
     return said;
+  },
+
+  /** Rows at places [x, z, yaw] with their feet held still, all of them, and how many came before the end. */
+  locked({ name, known, rows, places }) {
+    const { encoding, fps } = new Dreamer(weights(name), look, settings);
+    const lock = new LockStream(encoding, fps, known);
+    const done = rows.flatMap((row, t) => {
+      const [x, z, yaw] = places[t];
+      return lock.push({ row: Float64Array.from(row), place: { x, z, yaw } });
+    });
+    return { before: done.length, rows: [...done, ...lock.finish()].map(({ row }) => list(row)) };
+  },
+
+  /** Rotation vectors of the matrices of rotation vectors. */
+  vectors({ vectors }) {
+    return vectors.map((vector) => toVector(fromVector(...vector)));
   },
 
   recently({ rows, fps }) {

@@ -172,6 +172,23 @@ def test_beginning_again_gives_the_same_and_a_lock_waits(asked):
     assert made.live[0].behind.late > 0
 
 
+def test_who_is_far_from_a_line_goes_to_its_beginning_and_then_along_it(asked):
+    made, ask = asked
+    ask("begin", lock=0)
+    line = [[0.0, 3.0], [0.0, 5.0], [1.0, 6.0]]
+    first = ask(wish={"speed": 1.2, "line": line}, lock=0)["characters"][0]
+    assert first["asked"]["direction"] == pytest.approx(0, abs=0.2)
+    assert int(made.live[0].aim.which[0]) == -1
+    for _ in range(60):
+        (last,) = ask(wish={"speed": 1.2, "line": line}, lock=0)["characters"]
+        assert abs(last["asked"]["direction"]) <= math.pi
+    assert int(made.live[0].aim.which[0]) == 0 and float(made.live[0].aim.arcs[0]) > 1
+    assert math.hypot(last["places"][-1][0] - 1, last["places"][-1][1] - 6) < 1.2
+    ask(wish={"speed": 1.2, "direction": 0.0}, lock=0)
+    assert int(made.live[0].aim.which[0]) == -1
+    assert "at least" in ask(wish={"speed": 1.0, "line": [[0.0, 0.0]]})["failed"]
+
+
 def test_a_wish_that_leads_nowhere_is_told(asked):
     _, ask = asked
     ask("begin")

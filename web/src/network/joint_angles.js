@@ -1,6 +1,6 @@
 // Rows of motionlab/encodings/joint_angles.py (rotation vectors) as points in the world:
 //   [dx dz dyaw | height tilt_x tilt_z | rotation vector of every joint but the root | toe contacts]
-import { fromVector, matrices, place, product } from "../kinematics.js";
+import { fromVector, matrices, place, product, toVector, transposed } from "../kinematics.js";
 
 const ROOT = 6;
 
@@ -31,10 +31,20 @@ export class JointAngles {
     const [sine, cosine] = [Math.sin(yaw), Math.cos(yaw)];
     product([cosine, 0, sine, 0, 1, 0, -sine, 0, cosine], fromVector(row[4], 0, row[5]), locals[0]);
     for (let joint = 1; joint < locals.length; joint++) {
-      const at = ROOT + 3 * (joint - 1);
+      const at = this.columnOf(joint);
       product(body.mean_pose[joint], fromVector(row[at], row[at + 1], row[at + 2]), locals[joint]);
     }
     return place(body, [x, row[3], z], locals, turns, points);
+  }
+
+  /** Where a row's rotation vector of a joint that is not the root begins. */
+  columnOf(joint) {
+    return ROOT + 3 * (joint - 1);
+  }
+
+  /** The rotation vector that stands in a row for a joint's local rotation. */
+  numbersOf(joint, local) {
+    return toVector(product(transposed(this.body.mean_pose[joint]), local, new Float64Array(9)));
   }
 
   /** Bits of the player's left heel, left toe, right heel, right toe; a row knows of toes only. */

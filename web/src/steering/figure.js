@@ -13,6 +13,8 @@ import { SteerPlayer } from "./steer_player.js";
 
 const TELL_EVERY = 1000; // milliseconds
 const OF_HANDS = ["speed", "direction", "onward"]; // settings of what is asked; the others are of who does it
+const NEAR = [...OF_HANDS, "help", "lock", "refined"]; // those that stand right below the picture, where a thumb is
+const ROOMY = "(min-width: 481px)"; // a window in which all of them do
 
 const make = (tag, className, text = "") => Object.assign(document.createElement(tag), { className, textContent: text });
 const degrees = (angle) => Math.round((180 * angle) / Math.PI);
@@ -54,14 +56,17 @@ export class SteerFigure {
     this.status.setAttribute("role", "status");
     this.go = Object.assign(make("button", "ml-load", this.source.invitation(this.network)), { type: "button" });
     this.go.addEventListener("click", () => this.load());
-    this.grid = make("div", "ml-grid");
-    if (networks.length > 1) this.grid.append(this.chooser(number));
+    const [grid, others] = [make("div", "ml-grid ml-near"), make("div", "ml-grid")];
+    this.more = make("details", "ml-more");
+    this.more.open = globalThis.matchMedia?.(ROOMY).matches ?? true;
+    this.more.append(make("summary", "", "More settings"), others);
+    if (networks.length > 1) grid.append(this.chooser(number));
     const used = this.network.controls.filter(({ name }) => name !== "futures" || !beside.length);
     this.fields = Object.fromEntries(used.map((control) => [control.name, field(control, this.network.starts, (name, value) => this.change(name, value))]));
-    this.grid.append(...Object.values(this.fields));
+    for (const [name, box] of Object.entries(this.fields)) (NEAR.includes(name) ? grid : others).append(box);
     this.inside = make("div", "");
     this.course = new Course((path) => this.lead(path));
-    panel.append(this.told, this.go, this.status, this.grid, this.inside, this.course.element, ...(this.network.facts.length ? [provenance(this.network.facts)] : []));
+    panel.append(this.told, this.go, grid, this.status, this.more, this.course.element, this.inside, ...(this.network.facts.length ? [provenance(this.network.facts)] : []));
     this.setLive(false);
     return panel;
   }
@@ -79,8 +84,8 @@ export class SteerFigure {
 
   setLive(live) {
     this.go.hidden = live;
-    this.course.element.hidden = !live || !this.source.leads;
-    for (const part of [this.told, this.inside, ...Object.values(this.fields)]) part.hidden = !live;
+    this.stage.classList.toggle("ml-steered", live);
+    for (const part of [this.told, this.inside, this.more, this.course.element, ...Object.values(this.fields)]) part.hidden = !live;
   }
 
   show(build) {

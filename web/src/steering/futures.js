@@ -95,7 +95,9 @@ export class Futures {
     const left = off - wrapped(going.bearing - this.was.bearing);
     const still = speed < STILL;
     const body = still ? (CALM * moved) / ((WINDOW - 1) * (input.length - ROOT)) : half(left, WAY);
-    return half(going.pace - speed, SPEED) + half(going.turn - bend, TURNING) + body + FEET * feet;
+    const minds = (term) => this.settings[`term ${term}`] ?? 1;
+    const way = half(going.turn - bend, TURNING) + body;
+    return minds("speed") * half(going.pace - speed, SPEED) + minds("direction") * way + minds("feet") * FEET * feet;
   }
 
   /** Of all samples, energies in nats and the one that has least; NaN is worse than all. */

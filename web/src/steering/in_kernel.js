@@ -6,6 +6,7 @@ import { KEPT } from "./steered.js";
 
 const AHEAD = 6; // frames: a window is asked for so long before it is due
 const PATIENCE = 20_000; // milliseconds without an answer, after which a window is asked for again
+const AGAIN = 1000; // milliseconds after a refusal
 
 /** What a kernel steers, as the player wants it. */
 class KernelSteered {
@@ -15,8 +16,9 @@ class KernelSteered {
     this.restart();
   }
 
-  steer(wish) {
-    this.wish = wish;
+  /** What is asked with the next window; a path is sent as the line that was drawn. */
+  steer({ path, ...wish }) {
+    this.wish = path ? { ...wish, line: path.drawn } : wish;
   }
 
   /** Begin anew: what is there stays until the kernel answers; answers to what was asked before are not heard any more. */
@@ -38,15 +40,15 @@ class KernelSteered {
     this.model.send({ do: what, run: this.run, settings: this.settings, wish: this.wish });
   }
 
-  /** A window: rows and places of each character, what was asked and done, and what it took (seconds). */
-  heard({ run, characters, seconds }) {
-    if (run !== this.run) return;
+  /** A window: rows and places of each character, what was asked and done, how late it is, and what it took (seconds). */
+  heard({ characters, seconds }) {
     this.asked = null;
     if (this.fresh) {
       Object.assign(this, { fresh: false, last: -1 });
       this.tracks.length = 0; // the same array always: the player keeps it
     }
-    const first = this.last + 1;
+    const [first, [{ rows: { length }, late }]] = [this.last + 1, characters];
+    this.latency = [AHEAD, AHEAD + length].map((frames) => (frames + late) / this.fps);
     characters.forEach(({ rows, places, asked, done, record }, k) => {
       this.tracks[k] ??= new LiveTrack(this.encoding, this.fps, 0, { ...this.look, ...this.cast[k] }, KEPT);
       this.records[k] = record;
@@ -57,16 +59,20 @@ class KernelSteered {
         this.tracks[k].add(first + t, Float32Array.from(row), place, { asked, pace: done[0], bearing: done[1] });
       });
     });
-    this.last = first + characters[0].rows.length - 1;
-    if (seconds) this.cost = (1000 * seconds) / characters[0].rows.length;
+    this.last = first + length - 1;
+    if (seconds) this.cost = (1000 * seconds) / length;
     if (this.last < this.wanted + AHEAD && this.last > 0) this.ask("go");
+  }
+
+  /** What was asked leads nowhere; something else may be asked soon. */
+  refused() {
+    this.asked = performance.now() - PATIENCE + AGAIN;
   }
 }
 
 export class KernelSource {
   ready = true;
   looks = false;
-  leads = false;
 
   /** `model` is the widget's. */
   constructor(model) {
@@ -91,6 +97,7 @@ export class KernelSource {
     if (message.run !== this.steered?.run) return;
     if (message.failed) {
       this.failed = message.failed;
+      this.steered.refused();
       return this.reject(new Error(message.failed));
     }
     this.failed = "";
@@ -98,9 +105,12 @@ export class KernelSource {
     this.resolve(this.steered);
   }
 
-  cost({ cost, fps }) {
+  cost({ cost, fps, latency }) {
     if (this.failed) return this.failed;
-    return `The kernel makes ${Math.round(1000 / Math.max(cost, 1e-3))} frames a second; ${fps} are needed.`;
+    const [least, most] = latency.map((seconds) => seconds.toFixed(2));
+    const made = Math.round(1000 / Math.max(cost, 1e-3));
+    const slow = made < fps ? " Time passes slower." : "";
+    return `The kernel makes ${made} frames a second; ${fps} are needed. A wish is seen after ${least} to ${most} s.${slow}`;
   }
 
   dispose() {

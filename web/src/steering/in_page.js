@@ -9,7 +9,6 @@ const PACE = 1.2; // m/s, of a start that nobody chose
 export class PageSource {
   ready = false; // nothing is loaded until a reader asks for it
   looks = true; // the network can be looked into
-  leads = true; // along a line that is drawn
 
   invitation({ live }) {
     return `Load the network (${live.megabytes} MB)`;
@@ -22,8 +21,9 @@ export class PageSource {
     return new Steered(weights, live.look, body, settings, cast);
   }
 
-  cost({ cost, fps, cast }) {
+  cost({ cost, fps, cast, latency }) {
     const slow = cost > (SHARE * 1000) / fps ? " That is too much for this machine, and time passes slower" + (cast[0].futures ? "." : ": take fewer futures.") : "";
-    return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame.${slow}`;
+    const [least, most] = latency.map((seconds) => seconds.toFixed(2));
+    return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame. A wish is seen after ${least} to ${most} s.${slow}`;
   }
 }

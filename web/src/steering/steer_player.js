@@ -1,8 +1,10 @@
-// The player of characters who are steered while it plays. Keys steer while the picture has the focus, and only then.
+// The player of characters who are steered while it plays. Keys steer while the picture has the focus, or what stands below
+// it and has no use for them, and only then.
 import { LivePlayer } from "../network/live_player.js";
 import { TWIST } from "../player.js";
 import { Arrows } from "./arrows.js";
 import { steers } from "./commands.js";
+import { giveBack, takes } from "./focus.js";
 import { Stick } from "./stick.js";
 
 const BEHIND = Math.PI; // the camera's azimuth: one looks along z, as he does
@@ -21,10 +23,11 @@ export class SteerPlayer extends LivePlayer {
     this.bar.save.setAttribute("aria-label", this.bar.save.title);
     this.stick = new Stick((hand) => this.moved(hand));
     this.view.append(this.stick.element);
-    this.view.addEventListener("keyup", (event) => this.keyUp(event));
     this.letGo = () => this.release();
     this.hide = () => document.hidden && this.release();
-    this.canvas.addEventListener("blur", this.letGo);
+    this.hands = { keydown: (event) => this.beside(event), keyup: (event) => this.keyUp(event), focusout: (event) => this.left(event) };
+    for (const [type, hear] of Object.entries(this.hands)) host.addEventListener(type, hear);
+    this.keepFocus = giveBack(host, this.canvas);
     globalThis.addEventListener("blur", this.letGo);
     document.addEventListener("visibilitychange", this.hide);
   }
@@ -35,8 +38,17 @@ export class SteerPlayer extends LivePlayer {
 
   // -- hands --------------------------------------------------------------------------------------
 
+  /** A key while something below the picture has the focus. */
+  beside(event) {
+    const { target, key } = event;
+    if (this.view.contains(target)) return; // then `key` has heard it
+    if (key === "Enter" && target.matches("input[type=number]")) this.canvas.focus({ preventScroll: true });
+    const steering = steers(event);
+    if (steering && !takes(target, steering)) this.key(event);
+  }
+
   key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target !== this.canvas) return;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     this.commands.running = event.shiftKey;
     const steering = steers(event);
     const turns = { KeyQ: 0.15, KeyE: -0.15 };
@@ -58,12 +70,18 @@ export class SteerPlayer extends LivePlayer {
     if (steering) this.commands.keys.delete(steering);
   }
 
+  /** The focus leaves something; keys that are held are let go if they are another's now. */
+  left({ relatedTarget }) {
+    if (!this.host.contains(relatedTarget)) return this.release();
+    for (const key of this.commands.keys) if (takes(relatedTarget, key)) this.commands.keys.delete(key);
+  }
+
   moved(hand) {
     this.commands.stick = hand;
     if (Math.hypot(...hand)) this.play();
   }
 
-  /** Keys that are held when the focus goes are not held any more. */
+  /** Nothing is held any more: the focus has gone. */
   release() {
     this.commands.release();
     this.stick.release();
@@ -97,6 +115,8 @@ export class SteerPlayer extends LivePlayer {
   }
 
   dispose() {
+    for (const [type, hear] of Object.entries(this.hands)) this.host.removeEventListener(type, hear);
+    this.keepFocus();
     globalThis.removeEventListener("blur", this.letGo);
     document.removeEventListener("visibilitychange", this.hide);
     super.dispose();

@@ -1,5 +1,6 @@
 // Characters who are steered together, as the player of a motion in the making (network/live_player.js) wants them:
 // it asks for frames, and gets as many as can be made in the time there is.
+import { LockStream } from "../feet/lock_stream.js";
 import { JointAngles } from "../network/joint_angles.js";
 import { LiveTrack } from "../network/live_track.js";
 import { LstmGmm } from "../network/lstm_gmm.js";
@@ -16,13 +17,13 @@ const APART = 1.5; // metres between characters at first
 
 export class Steered {
   /**
-   * `weights` from weights.js; `look` as of a Dreamer; `body` as of FeetEnergy; `settings`: start, seed, futures, push,
-   * temperature, memory, refined, help; `cast`: for each character {label, color, futures (or none)}.
+   * `weights` from weights.js; `look` as of a Dreamer; `body` as of FeetEnergy, and of a LockStream if it has a `lock`;
+   * `settings`: start, seed, futures, push, temperature, memory, refined, lock, help; `cast`: for each character {label, color, futures (or none)}.
    */
-  constructor(weights, look, body, settings, cast) {
+  constructor(weights, look, { lock, ...body }, settings, cast) {
     const { fps } = weights;
     const encoding = new JointAngles(weights.encoding);
-    Object.assign(this, { weights, look, settings: { ...settings }, cast, fps, encoding, tracks: [], fastest: fastestOf(weights) });
+    Object.assign(this, { weights, look, legs: lock, settings: { ...settings }, cast, fps, encoding, tracks: [], fastest: fastestOf(weights) });
     const rows = normalizing(weights.normalizer);
     const refiner = weights.refiner && new Refiner(weights.refiner, encoding, rows);
     const network = new LstmGmm(weights.layers, weights.settings);
@@ -38,7 +39,7 @@ export class Steered {
 
   /** Begin anew; the same settings and wishes give the same motion. */
   restart() {
-    Object.assign(this, { last: 0, cost: 0 });
+    Object.assign(this, { last: 0, cost: 0, locks: null });
     const { start, seed } = this.settings;
     const begun = this.weights.starts[start];
     this.characters = this.cast.map((_, k) => new LiveControl(this.parts, begun, { x: -APART * k, z: 0, yaw: 0 }, seed));
@@ -92,10 +93,23 @@ export class Steered {
     const character = this.characters.find(({ window }) => !window?.full);
     character.work(this.settingsOf(character));
     if (!this.characters.every(({ window }) => window?.full)) return;
-    this.characters.forEach((one, k) => {
-      one.take(this.settings.refined ?? 1).forEach((made, t) => this.show(this.tracks[k], this.last + 1 + t, made));
-    });
-    this.last += WINDOW;
+    const windows = this.behind(this.characters.map((one) => one.take(this.settings.refined ?? 1)));
+    windows.forEach((frames, k) => frames.forEach((made, t) => this.show(this.tracks[k], this.last + 1 + t, made)));
+    this.last += windows[0].length;
+  }
+
+  /** The frames of each character as they are shown: those that were made, or with feet held still those before them. */
+  behind(made) {
+    const locked = this.legs && (this.settings.lock ?? 0);
+    const left = this.locks && !locked ? this.locks.map((lock) => lock.finish()) : made.map(() => []);
+    this.locks = locked ? this.locks ?? made.map(() => new LockStream(this.encoding, this.fps, this.legs)) : null;
+    return made.map((frames, k) => [...left[k], ...frames.flatMap((frame) => this.locks?.[k].push(frame) ?? frame)]);
+  }
+
+  /** Seconds from a wish until it is seen, least and most: a window that is begun does not hear it. */
+  get latency() {
+    const late = this.locks ? this.legs.ahead : 0;
+    return [AHEAD, AHEAD + WINDOW].map((frames) => (frames + late) / this.fps);
   }
 
   /** Without help nothing is asked, and nothing chosen. */

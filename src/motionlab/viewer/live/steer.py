@@ -32,9 +32,13 @@ def steer(
     """A character who goes where arrow keys, a stick or a gamepad lead him, and what can be seen of how.
 
     In a built page the network runs in the reader's browser, steered as by `LiveControl`: guided
-    samples of the next five frames, of which the best is kept. In a running kernel `control` does it,
-    and the page asks for each window as it needs it. What is asked and done stands below the picture,
-    and as arrows on the ground. What was done can be saved as .bvh or .glb.
+    samples of the next five frames, of which the best is kept, refined, and its feet locked. In a
+    running kernel `control` does it, and the page asks for each window as it needs it. What is asked
+    and done stands below the picture, and as arrows on the ground; how late a wish is seen is told
+    there. A line can be drawn, and he goes along it. What was done can be saved as .bvh or .glb.
+
+    Keys steer while the picture has the focus, or something below it that has no use for them. Where
+    the network knows no contacts, or the skeleton's rest pose does not stand, feet are not locked.
 
     Parameters
     ----------

@@ -6,6 +6,7 @@ nothing, and what is asked counts from the next window on.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -20,6 +21,7 @@ from ...errors import MotionLabError, ViewerError
 from ...kinematics import heading
 from ...metrics import broken
 from ...motion import Motion
+from ...paths import Path
 from .dream_settings import Control, name_of, sampled_tracks
 from .network_figure import live_of
 from .network_weights import WeightsScript, encoding_of
@@ -35,18 +37,17 @@ TERMS = {  # of solvers.live_control's gradient, by name
     "resting": "slow feet rest",
     "poses": "joints keep their range",
 }
-LOCK = Control("lock", "Hold feet still", "Toes in contact are held where they are; five frames late",
-               0, 1, 1, 1)  # fmt: skip
 GRADIENT = Control("gradient", "A gradient, too", "The paper's way: from the best future down the "
                    "slope of all terms below; slower", 0, 1, 1, 0)  # fmt: skip
 FEWEST = 1e-3  # temperature
+NEAR = 1.0  # metres from a line's beginning from where on it is followed, as web/src/steering/steered.js has it
 
 
 class SteerWidget(anywidget.AnyWidget):
     """Characters who are steered by hand; web/src/steering/ is the other side.
 
-    The page sends {do: "begin" | "go", run, settings, wish}. It is told {run, characters: [{rows, places, asked,
-    done, record}], seconds} for each window, or {run, failed}.
+    The page sends {do: "begin" | "go", run, settings, wish: {speed, direction or line}}. It is told {run,
+    characters: [{rows, places, asked, done, late, record}], seconds} for each window, or {run, failed}.
     """
 
     _esm = STATIC / "widget.js"
@@ -67,6 +68,7 @@ class SteerWidget(anywidget.AnyWidget):
         super().__init__(**traits)
         self._made = model, control, refiner, tuple(beside)
         self._live: list[Any] = []
+        self._lines: list[Any] = []  # that each of them goes along, if one
         self.on_msg(lambda _widget, message, _buffers: self._asked(message))
 
     @property
@@ -100,10 +102,11 @@ class SteerWidget(anywidget.AnyWidget):
             control(
                 model, int(settings["start"]), futures=futures, seed=int(settings["seed"]),
                 refiner=refiner if settings.get("refined", 1) else None,
-                lock=bool(settings["lock"]), places=[[-1.5 * k, 0.0, 0.0]],
+                lock=bool(settings.get("lock")), places=[[-1.5 * k, 0.0, 0.0]],
             )
             for k, futures in enumerate(several)
         ]  # fmt: skip
+        self._lines = [None] * len(several)
 
     def _window(self, message: dict[str, Any]) -> list[dict[str, Any]]:
         """The next frames of each of them."""
@@ -112,12 +115,29 @@ class SteerWidget(anywidget.AnyWidget):
         for k, live in enumerate(self._live):
             live.how = self._how(live, settings, k)
             if wish:
-                live.steer(wish.get("speed"), wish.get("direction"))
+                self._wish(live, wish, k)
             motion = None
             while motion is None:  # a lock gives nothing at first
                 (motion,) = live.go_on()
             made.append(_shown(live, motion))
         return made
+
+    def _wish(self, live: Any, wish: dict[str, Any], k: int) -> None:
+        """What is asked of a character: a way, or a line, to whose beginning he goes first."""
+        line = wish.get("line")
+        if line is None:
+            live.steer(wish.get("speed"), wish.get("direction"))
+        elif line == self._lines[k]:  # who goes along it goes on
+            live.steer(wish.get("speed"))
+        else:
+            path = Path.through(line)  # raises WayError
+            x, z = (path.places[0].double() - live.going.place[0, :2]).tolist()
+            if math.hypot(x, z) > NEAR:  # an arc from farther away is a detour
+                live.steer(wish.get("speed"), math.atan2(x, z))
+                line = None
+            else:
+                live.steer(wish.get("speed"), path=path)
+        self._lines[k] = line
 
     def _how(self, live: Any, settings: dict[str, Any], k: int) -> Any:
         """What a control does, by what the page's sliders say now."""
@@ -149,14 +169,25 @@ def _shown(live: Any, motion: Motion) -> dict[str, Any]:
     rows = live.model.encoding.encode(motion)
     yaw = heading(motion.rotations[:, 0].double())
     places = torch.cat([motion.root_positions[:, [0, 2]].double(), yaw[:, None]], 1)
-    record, going, aim = live.record(), live.going, live.aim
+    record, going = live.record(), live.going
     return {
         "rows": rows.double().numpy().round(5).tolist(),
         "places": places.numpy().round(5).tolist(),
-        "asked": {"speed": float(aim.speed[0]), "direction": float(aim.direction[0])},
+        "asked": _asked(live),
         "done": [float(going.velocity[0].norm()), float(going.bearing()[0])],
+        "late": live.behind.late,
         "record": {"notes": record["notes"]},
     }
+
+
+def _asked(live: Any) -> dict[str, float]:
+    """Speed and way that are asked now; of who goes along a line, where it leads from here."""
+    aim, going = live.aim, live.going
+    if int(aim.which[0]) < 0:
+        return {"speed": float(aim.speed[0]), "direction": float(aim.direction[0])}
+    speed, _, off = aim.wanted(going)
+    way = float(going.bearing()[0]) + float(off[0])
+    return {"speed": float(speed[0]), "direction": math.remainder(way, 2 * math.pi)}
 
 
 def widget(
@@ -176,7 +207,7 @@ def widget(
         )
     controls = [
         *(each for each in controls_of(model, look, refiner) if each["name"] not in ("help", "push")),
-        *(vars(each) for each in (LOCK, GRADIENT)),
+        vars(GRADIENT),
         *(vars(Control(f"term {name}", f"Term: {TERMS[name]}", "Whether the gradient minds it",
                        0, 1, 1, 1)) for name in _terms_of(model)),
     ]  # fmt: skip

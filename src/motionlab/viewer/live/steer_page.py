@@ -15,7 +15,7 @@ from .network_figure import NetworkFigure, live_of, provenance
 from .network_weights import WeightsScript, check_known, weights_script
 from .player import Track, payload
 from .show import still_picture
-from .steer_settings import Look, body_of, cast_of, check_model, controls_of
+from .steer_settings import Look, body_of, cast_of, check_model, choice_of, controls_of
 
 ROOM = 760  # pixels for settings and what is told
 CLIP = 2.0  # seconds of a clip that is seen until the network is loaded
@@ -53,7 +53,7 @@ def _network(
     """What the page knows of a network, its weights, and a little of its motion."""
     check_model(model)
     check_known(model)
-    controls = controls_of(model, look, refiner)
+    controls = [*controls_of(model, look, refiner), *choice_of()]
     weights = weights_script(model, name_of(model), refiner=refiner)
     start = next(int(each["value"]) for each in controls if each["name"] == "start")
     tracks = sampled_tracks(

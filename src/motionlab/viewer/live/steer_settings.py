@@ -9,9 +9,11 @@ from typing import Any
 from torch import nn
 
 from ...encodings import JointAngles
-from ...errors import ViewerError
+from ...errors import SkeletonError, ViewerError
 from ...feet.contacts import foot_points, rest_heights
+from ...feet.lock_stream import LockStream
 from ...metrics import broken
+from ...roles import SIDES
 from .dream_settings import CONTROLS, REFINED, Control, check_starts
 from .network_weights import check_refiner
 
@@ -27,6 +29,13 @@ HELP = Control("help", "Help", "Off: nothing is asked of the network, and it wan
 PUSH = Control("push", "Push", "How strongly each step is pushed to what is asked", 0, 1.5, 0.05, 1)
 FUTURES = Control("futures", "Futures (K)", "As many samples of the next five frames, of which the "
                   "best is kept", 1, 16, 1, 8)  # fmt: skip
+TERMS = {
+    "speed": "speed",
+    "direction": "direction",
+    "feet": "feet and poses",
+}  # of the choice among futures
+LOCK = Control("lock", "Lock the feet", "Toes in contact are held where they are; that must be known "
+               "ahead, so all is seen a sixth of a second later", 0, 1, 1, 1)  # fmt: skip
 _KNOWN = {control.name: control for control in CONTROLS}
 TEMPERATURE = replace(_KNOWN["temperature"], min=0.02, max=0.62, step=0.004)
 
@@ -83,9 +92,20 @@ def controls_of(model: nn.Module, look: Look, refiner: nn.Module | None) -> list
     some = [SPEED, DIRECTION, ONWARD, HELP, PUSH, FUTURES, *chance]
     if refiner is not None:
         some.append(REFINED)
+    if lock_of(model) is not None:
+        some.append(LOCK)
     return [
         asdict(control) | {"value": values.get(control.name, control.value)} for control in some
     ]
+
+
+def choice_of() -> list[dict[str, Any]]:
+    """A box to tick for each term by which a page chooses among futures."""
+    return [
+        asdict(Control(f"term {name}", f"Mind {said}", "Whether the choice among futures minds it; "
+                       "the push goes on by itself", 0, 1, 1, 1))
+        for name, said in TERMS.items()
+    ]  # fmt: skip
 
 
 def cast_of(beside: Sequence[int], color: str) -> list[dict[str, Any]]:
@@ -103,8 +123,20 @@ def start_of(model: nn.Module) -> int:
     return names.index("stand") if "stand" in names else 0
 
 
+def lock_of(model: nn.Module) -> dict[str, Any] | None:
+    """What web/src/feet/lock_stream.js must know of legs; None where nobody knows when feet are down."""
+    encoding = model.encoding
+    toes = [encoding.skeleton.roles.get(f"{side}_toes") for side in SIDES]
+    if "contacts" not in encoding.slices or None in toes:
+        return None
+    try:
+        return LockStream(encoding.skeleton, encoding.fps).known
+    except SkeletonError:  # its rest pose does not stand, and nobody gives an example
+        return None
+
+
 def body_of(model: nn.Module) -> dict[str, Any]:
-    """What web/src/steering/feet_energy.js must know: where feet are, and how far joints go."""
+    """What web/src/steering/ must know of a body: where feet are, how far joints go, how to lock feet."""
     encoding = model.encoding
     known = None
     if broken.knows(encoding):
@@ -115,4 +147,5 @@ def body_of(model: nn.Module) -> dict[str, Any]:
         "feet": foot_points(encoding.skeleton),
         "low": rest_heights(encoding.skeleton)[[1, 3]].tolist(),
         "ranges": known,
+        "lock": lock_of(model),
     }
