@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from numbers import Integral
-from typing import Self
+from typing import Literal, Self
 
 import torch
 from torch import Tensor, nn
@@ -48,8 +48,9 @@ class Strnn(nn.Module):
     encoding : `BodyFrame`. normalizer : fitted on the training split.
     width : of the LSTM layers and of a frame's code, 512 in the paper; a multiple of 8.
     encode, predict : frames that are read, and said again, and frames that are foretold.
-    spatial : encode and decode frames part by part (`strnn_parts`); otherwise frames are read as they
-        are, and said by one linear layer.
+    spatial : encode and decode frames part by part (`strnn_parts`); "dense": by layers of the same
+        sizes that know no parts, as an ERD has them. False: frames are read as they are, and said by
+        one linear layer.
     residual : four layers over all frames that were said, whose output is added to them. It begins as
         nothing.
     conditional : decoder and predictor hear what they have said; otherwise, in training, the true frame.
@@ -75,7 +76,7 @@ class Strnn(nn.Module):
         encode: int = 20,
         predict: int = 20,
         *,
-        spatial: bool = True,
+        spatial: bool | Literal["dense"] = True,
         residual: bool = True,
         conditional: bool = True,
         drop: float = 0.1,
@@ -85,6 +86,8 @@ class Strnn(nn.Module):
         super().__init__()
         check_normalizer(encoding, normalizer)
         _check(width, encode, predict, drop, smooth, penalty)
+        if spatial not in (True, False, "dense"):
+            raise ModelError(f'Strnn: spatial is {spatial!r}; it is True, False or "dense".')
         self.encoding, self.normalizer = encoding, normalizer
         self.width, self.encode, self.predict = width, encode, predict
         self.spatial, self.residual, self.conditional = spatial, residual, conditional
@@ -93,8 +96,9 @@ class Strnn(nn.Module):
         size = kept
         if spatial:
             parts, size = part_channels(encoding, normalizer.kept.tolist()), width
-            self.enter = SpatialEncoder(parts, width, drop)
-            self.leave = SpatialDecoder(parts, width, drop)
+            dense = spatial == "dense"
+            self.enter = SpatialEncoder(parts, width, drop, dense)
+            self.leave = SpatialDecoder(parts, width, drop, dense)
         else:
             self.leave = nn.Linear(width, kept)
         self.encoder = nn.LSTM(size, width, batch_first=True)

@@ -18,10 +18,21 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import MotionLabError, TrainingError
-from ..models import AcLstm, ConvAutoencoder, Erd, LstmGmm, Refiner, Seq2Seq, Strnn
+from ..models import (
+    AcLstm,
+    BidirectionalRnn,
+    ConvAutoencoder,
+    Erd,
+    LstmGmm,
+    Refiner,
+    Seq2Seq,
+    Strnn,
+)
 from ..models.pfnn import Pfnn
 
-_MODELS = (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn, ConvAutoencoder)
+_MODELS = (
+    LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn, ConvAutoencoder, BidirectionalRnn,
+)  # fmt: skip
 _KINDS = {kind.__name__: kind for kind in _MODELS}
 _STARTS = "starts."
 
