@@ -38,7 +38,7 @@ FAR = 10.0  # at most; what has left all bounds would decide every mean
 
 # A quarter of the paper's widths, and minutes a row.
 TABLE = replace(
-    PRESETS["strnn"]["table"], updates=1_000, decay=350, validate_every=250, warmup=50, quiet=500,
+    PRESETS["strnn"]["table"], updates=600, decay=200, validate_every=200, warmup=50, quiet=300,
     smooth=0.0, alone=0, behind=0,
 )  # fmt: skip
 SMOKE = replace(TABLE, updates=4, decay=1, validate_every=2, batch=4, width=32, quiet=2)
@@ -122,6 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for run in runs:
         if not run.done:
             run.train(data, run.row.name)
+    runs = [run for run in runs if run.done]
     result = {
         "preset": chosen.preset, "split": chosen.split, "starts": STARTS, "frames": FRAMES,
     } | judged([run for run in runs if run.row.method not in METHODS], data, chosen.split)  # fmt: skip

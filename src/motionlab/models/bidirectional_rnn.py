@@ -11,7 +11,6 @@ import torch
 from torch import Tensor, nn
 
 from ..encodings import BodyFrame, Normalizer
-from ..errors import ModelError
 from .strnn import Strnn
 
 
@@ -53,15 +52,16 @@ class BidirectionalRnn(Strnn):
         self.encoder = nn.RNN(self.kept, width // 2, batch_first=True, bidirectional=True)
         self.decoder, self.predictor = (_Alone(self.kept, width) for _ in range(2))
 
-    def _said(
-        self, seen: Tensor, true: Tensor | None = None, chance: torch.Generator | None = None,
-        decoded: bool = True,
-    ) -> tuple[Tensor, Tensor]:  # fmt: skip
-        """As `Strnn._said`; it always hears itself."""
-        if true is not None:
-            raise ModelError("BidirectionalRnn hears itself in training, too.")
+    def _state(self, seen: Tensor, chance: torch.Generator | None = None) -> tuple[Tensor, ...]:
         _, both = self.encoder(seen)
-        state = torch.cat([both[0], both[1]], 1)
+        return (torch.cat([both[0], both[1]], 1),)
+
+    def _told(
+        self, state: tuple[Tensor, ...], true: Tensor | None = None,
+        chance: torch.Generator | None = None, decoded: bool = True,
+    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """As `Strnn._told`; it always hears itself, and drops nothing."""
+        (state,) = state
         codes = self.predictor(state, self.predict, self.leave)
         if decoded:
             back = self.decoder(state, self.encode, self.leave)

@@ -182,13 +182,22 @@ class Strnn(nn.Module):
         self, seen: Tensor, true: Tensor | None = None, chance: torch.Generator | None = None,
         decoded: bool = True,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
-        """What decoder and predictor say of seen (batch, encode, kept), in the order of time, and h.
+        """What decoder and predictor say of seen (batch, encode, kept), in the order of time, and h."""
+        return self._told(self._state(seen, chance), true, chance, decoded)
+
+    def _state(self, seen: Tensor, chance: torch.Generator | None = None) -> tuple[Tensor, ...]:
+        """The encoder's h and C (1, batch, width) each, after seen (batch, encode, kept)."""
+        return self.encoder(self.enter(seen, chance) if self.spatial else seen)[1]
+
+    def _told(
+        self, state: tuple[Tensor, ...], true: Tensor | None = None,
+        chance: torch.Generator | None = None, decoded: bool = True,
+    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """What is said from a state, and h.
 
         true : (batch, encode + predict, kept), what both hear if they do not hear themselves.
         decoded : False leaves out the decoder's frames.
         """
-        read = self.enter(seen, chance) if self.spatial else seen
-        _, state = self.encoder(read)
         back_alone, ahead_alone = self._alone()
         back = ahead = None
         if true is not None:
