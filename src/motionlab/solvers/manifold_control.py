@@ -38,9 +38,9 @@ class Costs(NamedTuple):
 
     control: float = 1.0
     """Squared deviations from the velocities that are wished, in m/s and rad/s."""
-    bones: float = 100.0
+    bones: float = 300.0
     """Squared errors of bones in m."""
-    contacts: float = 0.3
+    contacts: float = 1.0
     """Squared speeds over the ground, in m/s, of feet whose contact bit is set."""
     read: float = 1.0
     """Squared errors of the frames that are read and said again, in deviations."""
