@@ -34,6 +34,7 @@ from .rivals import METHODS, RivalPreset
 
 FOLDER = Path("runs/strnn_ablations")
 STARTS, FRAMES = 50, 200
+POSES = 10  # of a rollout, that are kept to look at
 FAR = 10.0  # at most; what has left all bounds would decide every mean
 
 # A quarter of the paper's widths, and minutes a row.
@@ -176,9 +177,12 @@ def judged(runs: Sequence[Run], data: Prepared, split: str) -> dict:
     # networks that read more than 20 frames get more of the same clip
     seeds = torch.stack([clip[at - longest : at] for clip, at in zip(chosen, starts, strict=True)])
     rows: dict[str, dict] = {}
+    seen = shown(kinds_of(chosen, clips, kinds))
     for run in runs:
         model, _ = load_weights(weights_of(run))
         row = rows.setdefault(run.row.name, {"what": run.row.what, "seeds": {}})
+        if run.seed == 0:
+            row["poses (m)"] = strip(model, seeds[seen], data)
         row["seeds"][str(run.seed)] = of_one(model, seeds, clips, data, real) | {
             "updates": run.made, "seconds of training": run.curve[-1]["seconds"],
             "validation": run.validation,
@@ -195,6 +199,25 @@ def judged(runs: Sequence[Run], data: Prepared, split: str) -> dict:
             for claim, pairs in PAIRS.items()
         },
     }  # fmt: skip
+
+
+def kinds_of(chosen: Sequence[Tensor], clips: Sequence[Tensor], kinds: Sequence[str]) -> list[str]:
+    """The source of each chosen clip."""
+    of = {clip.data_ptr(): kind for clip, kind in zip(clips, kinds, strict=True)}
+    return [of[clip.data_ptr()] for clip in chosen]
+
+
+def shown(kinds: Sequence[str]) -> int:
+    """Which prefix is looked at: the first of somebody who walks or runs."""
+    return kinds.index("bandai-locomotion") if "bandai-locomotion" in kinds else 0
+
+
+@torch.no_grad()
+def strip(model: Strnn, seed: Tensor, data: Prepared) -> list:
+    """Poses (POSES, joints, 3) of what follows frames (encode, dim), in metres, kept in place."""
+    made = model.extrapolate(seed[None], FRAMES)[0].nan_to_num(0.0, 10.0, -10.0).clamp(-10.0, 10.0)
+    points = data.encoding._points(made[:: FRAMES // POSES])
+    return (points * 1000).round().div(1000).tolist()
 
 
 @torch.no_grad()

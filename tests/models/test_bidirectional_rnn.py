@@ -69,6 +69,7 @@ def test_it_learns_and_goes_on_as_an_strnn_does(clips, tmp_path):
     made = model.extrapolate(rows[:, :8], 9)
     assert made.shape == (3, 9, 73)
     assert torch.allclose(made[:, :4], model(rows[:, 2:8])[:, 6:], atol=1e-5)
+    assert torch.allclose(model.say(model.code(rows[:, 2:8])), model(rows[:, 2:8]), atol=1e-5)
     assert model.project(rows[:, :20]).shape == (3, 20, 73)
     save_weights(tmp_path / "b.safetensors", model, {})
     again = motionlab.load(tmp_path / "b.safetensors")

@@ -114,6 +114,21 @@ def test_a_path_is_aimed_at_from_beside_it():
     assert float((path.diff(dim=1).norm(dim=-1) * 30).max()) < 1.5
 
 
+def test_who_does_as_is_asked_keeps_his_speed():
+    """More than half a metre a window: the place on the path must not lag behind the body."""
+    bend = torch.linspace(0, 6, 200, dtype=torch.float64)
+    way = Path.through(torch.stack([2 - 2 * (bend / 2).cos(), 2 * (bend / 2).sin()], 1))
+    wish, place, far = along([way], torch.tensor([1.5]), 30), torch.zeros(1, 3), 0.0
+    for _ in range(5):
+        asked = wish(place, 20)
+        steps = torch.cat([asked[:, :1], asked], 1) / 30
+        path, yaw = walk(steps, tuple(place.double().unbind(-1)))
+        far += float(path.diff(dim=1).norm(dim=-1).sum())
+        place = torch.cat([path[:, -1, [0, 2]], yaw[:, -1:]], 1)
+    assert math.isclose(far, 5.0, rel_tol=0.02)
+    assert abs(float(place[:, :2].sub(torch.tensor([[2.0, 0.0]])).norm()) - 2) < 0.02
+
+
 def test_places_are_where_the_motion_is(model, clips):
     way = Path.through(torch.tensor([[1.0, 2.0], [1.0, 6.0]]))
     start = torch.tensor([[1.0, 2.0, 0.0]])

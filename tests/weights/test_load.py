@@ -13,7 +13,6 @@ import motionlab
 from experiments.shipping import cards
 from experiments.shipping.weights import ship
 from motionlab import contacts, metrics, weights
-from motionlab.datasets import gaits as gaits_of_ours
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import LstmGmm
 from motionlab.training.checkpoints import load_weights, save_weights

@@ -32,6 +32,7 @@ class BidirectionalRnn(Strnn):
     ModelError : as `Strnn` does.
     """
 
+    codes = 1
     settings = ("width", "encode", "predict", "smooth", "penalty")
 
     def __init__(
@@ -54,14 +55,14 @@ class BidirectionalRnn(Strnn):
 
     def _state(self, seen: Tensor, chance: torch.Generator | None = None) -> tuple[Tensor, ...]:
         _, both = self.encoder(seen)
-        return (torch.cat([both[0], both[1]], 1),)
+        return (torch.cat([both[0], both[1]], 1)[None],)
 
     def _told(
         self, state: tuple[Tensor, ...], true: Tensor | None = None,
         chance: torch.Generator | None = None, decoded: bool = True,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
         """As `Strnn._told`; it always hears itself, and drops nothing."""
-        (state,) = state
+        ((state,),) = state
         codes = self.predictor(state, self.predict, self.leave)
         if decoded:
             back = self.decoder(state, self.encode, self.leave)

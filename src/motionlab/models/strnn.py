@@ -64,6 +64,7 @@ class Strnn(nn.Module):
     ModelError : another encoding, sizes that make no sense, a skeleton that lacks a part.
     """
 
+    codes = 2  # h and C
     settings = (
         "width", "encode", "predict", "spatial", "residual", "conditional", "drop", "smooth", "penalty"
     )  # fmt: skip
@@ -287,6 +288,36 @@ class Strnn(nn.Module):
         if not isinstance(step, Integral) or not 1 <= step <= self.encode:
             raise ModelError(f"project: step is {step!r}; it must lie between 1 and {self.encode}.")
         return self._again("project", features, step)
+
+    def code(self, features: Tensor) -> Tensor:
+        """What the encoder knows after the last `encode` of features (batch, frames, dim): h and C side
+        by side, (batch, 2 width). A place on the manifold; `say` is the way back."""
+        seen, one = self._checked("code", features)
+        with at_rest(self):
+            found = torch.cat([part[0] for part in self._state(seen[:, -self.encode :])], 1)
+        return found[0] if one else found
+
+    def say(self, code: Tensor) -> Tensor:
+        """The frames (batch, encode + predict, dim) that are said of codes (batch, 2 width) of `code`;
+        of one code (2 width,) they are (encode + predict, dim).
+
+        Raises
+        ------
+        ModelError : codes of another size, or NaN.
+        """
+        size = self.codes * self.width
+        code = torch.as_tensor(code).to(self.normalizer.mean)
+        if code.ndim not in (1, 2) or code.shape[-1] != size or not bool(code.isfinite().all()):
+            raise ModelError(
+                f"say: codes of shape {tuple(code.shape)}; they must be (batch, {size}) without NaN, as "
+                "`code` gives them."
+            )
+        one = code.ndim == 1
+        state = (code[None] if one else code)[None].split(self.width, -1)
+        with at_rest(self):
+            said = self._filtered(self._told(tuple(part.contiguous() for part in state))[0])
+        said = self.normalizer.inverse(said)
+        return said[0] if one else said
 
     def _again(self, what: str, features: Tensor, step: int) -> Tensor:
         seen, one = self._checked(what, features)

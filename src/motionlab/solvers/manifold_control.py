@@ -23,7 +23,7 @@ from ..errors import SolverError
 from ..feet.contacts import foot_points
 from ..models import Strnn
 from ..models.strnn import at_rest
-from ..paths import Curves, Path
+from ..paths import BACK, ON, Curves, Path
 
 RATES = {"weights": 3e-4, "state": 0.03}  # of learning
 Fitted = Literal["weights", "state"]
@@ -218,10 +218,13 @@ def along(paths: Sequence[Path], speeds: Tensor, fps: float) -> Wish:
         )
     curves, which = Curves(paths), torch.arange(len(paths))
     arcs = torch.zeros(len(paths), dtype=torch.float64)
+    gone = torch.zeros_like(arcs)  # metres that were asked of the last window
 
     def wish(place: Tensor, n: int) -> Tensor:
         place = place.double()
-        arcs[:] = curves.onward(place[:, :2], arcs, which)
+        near = curves.piece(arcs - BACK, arcs + gone + ON, which)
+        arcs[:] = near.nearest(place[:, None, :2]).arcs[:, 0]
+        gone[:] = speeds * n / fps
         ahead = arcs[:, None] + speeds[:, None] / fps * torch.arange(0, n + 1)
         aims = curves.at(ahead, which)
         ways = curves.ways(ahead, which)

@@ -27,7 +27,7 @@ _PAGE = """
 <figure class="motionlab-pose-map" id="{key}">
 <style>
 #{key} .both {{ display: flex; flex-wrap: wrap; gap: 1em; }}
-#{key} canvas {{ flex: 1 1 260px; width: 100%; max-width: 420px; height: 300px; border-radius: 4px;
+#{key} canvas {{ flex: 1 1 240px; min-width: 0; max-width: 420px; height: 300px; border-radius: 4px;
   background: rgba(128, 128, 128, .08); touch-action: none; }}
 #{key} canvas.map {{ cursor: crosshair; }}
 #{key} .key {{ display: inline-block; width: .8em; height: .8em; border-radius: 50%; margin: 0 .3em 0 1em; }}
