@@ -5,6 +5,8 @@ from __future__ import annotations
 from .verdict import NOT, PARTLY, REPRODUCED, Absent, Verdict
 
 STARTS, FRAMES, WINDOWS = 50, 20_000, 512
+CONTROLLED = 1_000  # frames of a run along a path
+RIVALS = ("lstm-3lr", "erd", "seq2seq", "6-gram")
 SHORT = 10.0  # seconds; a cycle that is shorter is a loop that is seen
 
 
@@ -15,7 +17,88 @@ def _row(found: dict) -> dict:
     return next(iter(found["rows"].values()))
 
 
-# -- S2 -------------------------------------------------------------------------------------------
+# -- S1, S2, S8, S9, S10: ablations ---------------------------------------------------------------
+
+
+def _ablated(found: dict, claim: str = "") -> dict:
+    """Rows, or the pairs of a claim, of a result that counts."""
+    if found["split"] != "test" or found["preset"] != "table":
+        raise Absent("the result there is not of test clips, or of another preset than table")
+    return found["pairs"][claim] if claim else found["rows"]
+
+
+def _distance(row: dict, seed: str = "0") -> float:
+    far = row["seeds"][seed]["to real"]
+    return sum(far) / len(far)
+
+
+def _told(pairs: dict) -> dict:
+    """How much nearer the first of each pair is, as the ledger shows it."""
+    return {
+        f"{pair}: {its['found']}, by": -its["difference"]["value"] for pair, its in pairs.items()
+    }
+
+
+def s1(limits: dict, found: dict) -> Verdict:
+    rows = _ablated(found)
+    names = {length: f"Temporal_{length}_MSE" for length in ("39_1", "35_5", "30_10", "20_20")}
+    error = {n: rows[name]["seeds"]["0"]["errors"]["all"] for n, name in names.items()}
+    far = {n: _distance(rows[name]) for n, name in names.items()}
+    fits = (error["20_20"] <= limits["less"] * error["30_10"]
+            and error["30_10"] <= limits["less"] * error["35_5"])  # fmt: skip
+    numbers = {f"squared error, {n}": its for n, its in error.items()}
+    numbers |= {f"manifold distance, {n}": its for n, its in far.items()}
+    numbers["manifold distance of real motion"] = found["real"]["to real"]
+    good = [fits, min(far, key=far.get) == "20_20"]
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+
+
+def s2(limits: dict, found: dict) -> Verdict:
+    pairs = _ablated(found, "S2")
+    results = [its["found"] for its in pairs.values()]
+    nearer = results.count("better") / len(results)
+    full = pairs["Composite_20_20_HY < Temporal_39_1_MSE"]["found"] == "better"
+    if full and nearer >= limits["most"] and "worse" not in results:
+        return Verdict(REPRODUCED, _told(pairs))
+    return Verdict(PARTLY if full or nearer >= 0.5 else NOT, _told(pairs))
+
+
+def s8(limits: dict, found: dict) -> Verdict:
+    pairs = _ablated(found, "S8")
+    results = [its["found"] for its in pairs.values()]
+    if results.count("better") == len(results):
+        return Verdict(REPRODUCED, _told(pairs))
+    partly = "better" in results and "worse" not in results
+    return Verdict(PARTLY if partly else NOT, _told(pairs))
+
+
+def s9(limits: dict, found: dict) -> Verdict:
+    rows, pairs = _ablated(found), _ablated(found, "S9")
+    far = {n: _distance(rows[f"Composite_{n}_HY"]) for n in ("20_20", "10_10", "5_5")}
+    good = [
+        all(its["found"] == "better" for its in pairs.values()),
+        max(far["10_10"], far["5_5"]) <= limits["more"] * far["20_20"],
+    ]
+    numbers = _told(pairs) | {f"manifold distance, {n}": its for n, its in far.items()}
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+
+
+def s10_noise(limits: dict, found: dict) -> Verdict:
+    pairs = _ablated(found, "S10-noise")
+    none, steady = (pairs[f"Temporal_20_20_MSE < {name}"]["found"]
+                    for name in ("no noise", "steady noise"))  # fmt: skip
+    if none == "better" and steady != "worse":
+        return Verdict(REPRODUCED, _told(pairs))
+    return Verdict(PARTLY if "better" in (none, steady) else NOT, _told(pairs))
+
+
+def s10_narrow(limits: dict, found: dict) -> Verdict:
+    pairs = _ablated(found, "S10-narrow")
+    wide = all(its["found"] == "better" for its in pairs.values())
+    return Verdict(REPRODUCED if wide else NOT, _told(pairs))
+
+
+# -- S2: seams ------------------------------------------------------------------------------------
 
 
 def s2_seams(limits: dict, found: dict) -> Verdict:
@@ -120,6 +203,55 @@ def s4_filters(limits: dict, found: dict) -> Verdict:
     return Verdict(verdict, numbers)
 
 
+# -- S5, S6, S7 -----------------------------------------------------------------------------------
+
+
+def s5(limits: dict, found: dict) -> Verdict:
+    if found["split"] != "test" or found["frames"] < CONTROLLED:
+        raise Absent("the result there is not of test clips, or of fewer frames than asked for")
+    full, alone = found["rows"]["weights"], found["rows"]["weights, control alone"]
+    numbers = {
+        "runs": full["runs"], "alive": full["alive"],
+        "root to path, median (cm)": full["root to path, median (cm)"],
+        "root to path, worst (cm)": full["root to path, worst (cm)"],
+        **{f"{what}, {title}": row[what]
+           for what in ("foot skate (cm/s)", "bones, mean (cm)")
+           for title, row in (("all costs", full), ("control alone", alone))},
+    }  # fmt: skip
+    cleaner = all(full[what] < alone[what] for what in ("foot skate (cm/s)", "bones, mean (cm)"))
+    rms, alive = full["root to path, median (cm)"], full["alive"]
+    if rms <= limits["rms"] and alive >= limits["alive"] and cleaner and full["weights restored"]:
+        return Verdict(REPRODUCED, numbers)
+    return Verdict(PARTLY if rms <= limits["far"] and alive > 0.5 else NOT, numbers)
+
+
+def s6(limits: dict, found: dict) -> Verdict:
+    if found["split"] != "test":
+        raise Absent("the result there is not of test clips")
+    rows = found["rows"]
+    ours, rivals = rows["Composite_20_20_HY"], [rows[name] for name in RIVALS]
+    first = {ms: ours[ms] < min(rival[ms] for rival in rivals) for ms in ours}
+    numbers = {f"{name}, {ms}": rows[name][ms]
+               for ms in ("80 ms", "320 ms", "560 ms") for name in ("Composite_20_20_HY", *RIVALS)}  # fmt: skip
+    later = [won for ms, won in first.items() if int(ms.split()[0]) >= limits["later"]]
+    verdict = REPRODUCED if all(first.values()) else PARTLY if all(later) else NOT
+    return Verdict(verdict, numbers)
+
+
+def s7(limits: dict, bench: dict, found: dict) -> Verdict:
+    numbers = {
+        "frames a second, 256 characters in open loop":
+            bench["open_loop"]["frames_per_second"]["ours, 256 characters"],
+        "frames a second, one character, under control":
+            found["rows"]["weights"]["frames a second, one character"],
+    }  # fmt: skip
+    good = [its >= limits[key] for its, key in zip(numbers.values(), ("open", "controlled"),
+                                                   strict=True)]  # fmt: skip
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+
+
 RULES = {
-    "S2-seams": s2_seams, "S3": s3, "S3-noise": s3_noise, "S4": s4, "S4-filters": s4_filters,
+    "S1": s1, "S2": s2, "S2-seams": s2_seams, "S3": s3, "S3-noise": s3_noise, "S4": s4,
+    "S4-filters": s4_filters, "S5": s5, "S6": s6, "S7": s7, "S8": s8, "S9": s9,
+    "S10-noise": s10_noise, "S10-narrow": s10_narrow,
 }  # fmt: skip

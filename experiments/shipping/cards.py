@@ -40,8 +40,7 @@ SNIPPETS = {
 features = model.generate(300, model.starts[0], **model.sampling)
 motion = model.encoding.to_motion(features[0])""",
     "Strnn": """\
-seen = model.encoding.encode(motionlab.datasets.load("gaits")[0])
-features = model.extrapolate(seen, 300, **model.sampling)
+features = model.extrapolate(model.starts[0], 300, **model.sampling)
 motion = model.encoding.to_motion(features)""",
 }
 SNIPPETS["AcLstm"] = SNIPPETS["LstmGmm"]

@@ -6,7 +6,7 @@
 
 Rounds the parameters to half precision, adds states to start from, of validation clips, fits the
 temperature of a mixture on these clips unless one is given, and says on the card what the weights
-are and what rounding costs. An STRNN has no states: it goes on from frames. No number on the card is typed.
+are and what rounding costs. An STRNN has no states: its starts are frames. No number on the card is typed.
 """
 
 from __future__ import annotations
@@ -27,10 +27,12 @@ from motionlab.training.checkpoints import load_weights, save_weights, write_who
 from motionlab.training.evaluation import likelihood
 from motionlab.training.finish import fit_temperature
 from motionlab.training.starts import before_starts
+from motionlab.training.strnn import in_body_frame
 
 from ..common import record
 from .cards import card, command_of, free_only, licence_of
 
+PER_SOURCE = 2  # starts of an STRNN
 FOLDER = Path(motionlab.__file__).parent / "weights"
 
 
@@ -71,7 +73,7 @@ def ship(
     halved = rounded(model)
     state, starts = None, []
     if isinstance(model, Strnn):
-        facts = manifold(model, halved, data, made, sampling)
+        state, starts, facts = manifold(model, halved, data, made, sampling)
     else:
         ready = mixture if isinstance(model, LstmGmm) else dancer
         before, starts, sampling, facts = ready(model, halved, data, made, sampling)
@@ -144,11 +146,23 @@ def dancer(
     return before, names, sampling, {"validation loss": loss}
 
 
-def manifold(model: Strnn, halved: Strnn, data: Prepared, made: dict, sampling: dict) -> dict:
-    """What else to know of an STRNN."""
-    loss, windows = losses(model, halved, data, made)
-    halved.extrapolate(windows[:1, : model.encode], 2, **sampling)  # refuses what makes no sense
-    return {"validation loss": loss}
+def manifold(
+    model: Strnn, halved: Strnn, data: Prepared, made: dict, sampling: dict
+) -> tuple[Tensor, list[str], dict]:
+    """Frames that each start begins with (starts, encode, dim), of which clips, and what else to know."""
+    loss, _ = losses(model, halved, data, made)
+    rows = in_body_frame(data)
+    names = [n for n, split in zip(rows.names, rows.splits, strict=True) if split == "val"]
+    by_source: dict[str, list[tuple[str, Tensor]]] = {}
+    for name, clip in zip(names, rows.clips("val"), strict=True):
+        if len(clip) >= 2 * model.encode:
+            seen = clip[len(clip) // 2 - model.encode :][: model.encode]
+            by_source.setdefault(name.partition("/")[0], []).append((name, seen))
+    chosen = [some[i] for some in by_source.values()
+              for i in sorted({0, len(some) // 2, len(some) - 1})[:PER_SOURCE]]  # fmt: skip
+    frames = torch.stack([seen for _, seen in chosen])
+    halved.extrapolate(frames, 2, **sampling)  # refuses what makes no sense
+    return frames, [name for name, _ in chosen], {"validation loss": loss}
 
 
 @torch.no_grad()

@@ -277,3 +277,27 @@ def test_another_encoding_or_normalizer(clips):
         Strnn(angles, Normalizer(angles.dim))
     with pytest.raises(ModelError, match="normalizer"):
         Strnn(clips[0], Normalizer(9))
+
+
+@pytest.mark.parametrize("kind", ["temporal", "composite"])
+def test_what_is_said_of_a_code_is_what_is_said_of_its_frames(clips, kind):
+    model, rows = made(clips, kind).eval(), clips[1][:3, :9]
+    code = model.code(rows)
+    assert code.shape == (3, 2 * model.width)
+    assert torch.allclose(model.say(code), model(rows[:, -4:]))
+    assert torch.allclose(model.say(model.code(rows[1])), model(rows[:, -4:])[1])
+    with pytest.raises(ModelError, match="say"):
+        model.say(code[:, 1:])
+    with pytest.raises(ModelError, match="say"):
+        model.say(code * torch.nan)
+
+
+def test_layers_that_know_no_parts(clips):
+    dense, tree = made(clips, "spatiotemp", spatial="dense"), made(clips, "spatiotemp")
+    shapes = lambda model: {name: its.shape for name, its in model.named_parameters()}
+    assert shapes(dense) == shapes(tree), "of the same sizes"
+    masks = [its for name, its in dense.named_buffers() if name.endswith("mask")]
+    assert masks and all(bool(mask.bool().all()) for mask in masks)
+    assert dense(clips[1][:, :4]).isfinite().all()
+    with pytest.raises(ModelError, match="spatial"):
+        made(clips, spatial="flat")

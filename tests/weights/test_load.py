@@ -13,7 +13,6 @@ import motionlab
 from experiments.shipping import cards
 from experiments.shipping.weights import ship
 from motionlab import contacts, metrics, weights
-from motionlab.datasets import gaits as gaits_of_ours
 from motionlab.errors import ModelError, TrainingError
 from motionlab.models import LstmGmm
 from motionlab.training.checkpoints import load_weights, save_weights
@@ -250,13 +249,15 @@ def test_an_strnn_ships_with_a_card_and_goes_on_from_frames(gaits, tmp_path):
         "strnn-tiny", tmp_path / "best.safetensors", str(gaits.path), tmp_path, {"noise": 0.05}
     )
     model = motionlab.load(path)
-    assert model.sampling == {"noise": 0.05} and model.start_names == ()
+    assert model.sampling == {"noise": 0.05} and 0 < len(model.start_names) == len(model.starts)
+    assert model.starts.shape[1:] == (20, 73) and set(model.start_names) <= set(gaits.data.names)
+    assert model.extrapolate(model.starts, 30).shape == (len(model.starts), 30, 73)
     seen = model.encoding.encode(datasets.load("gaits")[0])
     assert model.extrapolate(seen, 30, **model.sampling).isfinite().all()
     half, full = (model.about["validation loss"][kind] for kind in ("half", "full"))
     assert half != full and half == pytest.approx(full, rel=0.01)
     for said in ("# strnn-tiny\n", "Long-horizon", f"held-out loss | {half:.4f}", "foretold", "MIT",
-                 "model.extrapolate(seen, 300", "any 20 frames", "the best of validation",
+                 "model.extrapolate(model.starts[0], 300", "the best of validation",
                  "motionlab train strnn-temporal-hy --preset smoke"):  # fmt: skip
         assert said in model.card, said
     with pytest.raises(motionlab.MotionLabError, match="noise"):
@@ -293,8 +294,8 @@ def test_what_is_shipped(name):
     assert model.about["name"] == name and model.card.startswith(f"# {name}\n")
     chance = torch.Generator().manual_seed(0)
     if name.startswith("strnn"):
-        seen = model.encoding.encode(gaits_of_ours.make(seconds=2, speed=1.2))
-        made = model.extrapolate(seen, 60, generator=chance, **model.sampling)
+        assert 4 <= len(model.starts) == len(model.start_names)
+        made = model.extrapolate(model.starts, 60, generator=chance, **model.sampling)
     else:
         assert 4 <= len(model.starts.frame) == len(model.start_names)
         made = model.generate(60, model.starts, generator=chance, **model.sampling)

@@ -83,7 +83,9 @@ class Train:
             ) from error
         chosen = {key: getattr(self, key) for key in ("updates", "learning_rate", "seed")}
         preset = replace(preset, **{key: its for key, its in chosen.items() if its is not None})
-        walks = self.model.startswith(("pfnn", "lstm-gmm", "strnn", "conv-autoencoder"))
+        walks = self.model.startswith(
+            ("pfnn", "lstm-gmm", "strnn", "conv-autoencoder", "bidirectional")
+        )
         style = "locomotion" if walks else self.model.rpartition("-")[2]
         data = Prepared.find(self.data or style, self._free, **self.folder.reading())
         if self.model == "lstm-gmm":

@@ -8,6 +8,7 @@ again and goes on with none.
 """
 
 from .aclstm import AcLstm, auto_condition
+from .bidirectional_rnn import BidirectionalRnn
 from .conv_autoencoder import ConvAutoencoder
 from .erd import Erd
 from .lstm_gmm import LstmGmm, Mixture
@@ -19,6 +20,7 @@ from .strnn import Strnn
 
 __all__ = [
     "AcLstm",
+    "BidirectionalRnn",
     "ConvAutoencoder",
     "Discriminator",
     "Erd",

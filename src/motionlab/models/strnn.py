@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from numbers import Integral
-from typing import Self
+from typing import Literal, Self
 
 import torch
 from torch import Tensor, nn
@@ -48,8 +48,9 @@ class Strnn(nn.Module):
     encoding : `BodyFrame`. normalizer : fitted on the training split.
     width : of the LSTM layers and of a frame's code, 512 in the paper; a multiple of 8.
     encode, predict : frames that are read, and said again, and frames that are foretold.
-    spatial : encode and decode frames part by part (`strnn_parts`); otherwise frames are read as they
-        are, and said by one linear layer.
+    spatial : encode and decode frames part by part (`strnn_parts`); "dense": by layers of the same
+        sizes that know no parts, as an ERD has them. False: frames are read as they are, and said by
+        one linear layer.
     residual : four layers over all frames that were said, whose output is added to them. It begins as
         nothing.
     conditional : decoder and predictor hear what they have said; otherwise, in training, the true frame.
@@ -63,6 +64,7 @@ class Strnn(nn.Module):
     ModelError : another encoding, sizes that make no sense, a skeleton that lacks a part.
     """
 
+    codes = 2  # h and C
     settings = (
         "width", "encode", "predict", "spatial", "residual", "conditional", "drop", "smooth", "penalty"
     )  # fmt: skip
@@ -75,7 +77,7 @@ class Strnn(nn.Module):
         encode: int = 20,
         predict: int = 20,
         *,
-        spatial: bool = True,
+        spatial: bool | Literal["dense"] = True,
         residual: bool = True,
         conditional: bool = True,
         drop: float = 0.1,
@@ -85,6 +87,8 @@ class Strnn(nn.Module):
         super().__init__()
         check_normalizer(encoding, normalizer)
         _check(width, encode, predict, drop, smooth, penalty)
+        if spatial not in (True, False, "dense"):
+            raise ModelError(f'Strnn: spatial is {spatial!r}; it is True, False or "dense".')
         self.encoding, self.normalizer = encoding, normalizer
         self.width, self.encode, self.predict = width, encode, predict
         self.spatial, self.residual, self.conditional = spatial, residual, conditional
@@ -93,8 +97,9 @@ class Strnn(nn.Module):
         size = kept
         if spatial:
             parts, size = part_channels(encoding, normalizer.kept.tolist()), width
-            self.enter = SpatialEncoder(parts, width, drop)
-            self.leave = SpatialDecoder(parts, width, drop)
+            dense = spatial == "dense"
+            self.enter = SpatialEncoder(parts, width, drop, dense)
+            self.leave = SpatialDecoder(parts, width, drop, dense)
         else:
             self.leave = nn.Linear(width, kept)
         self.encoder = nn.LSTM(size, width, batch_first=True)
@@ -178,13 +183,22 @@ class Strnn(nn.Module):
         self, seen: Tensor, true: Tensor | None = None, chance: torch.Generator | None = None,
         decoded: bool = True,
     ) -> tuple[Tensor, Tensor]:  # fmt: skip
-        """What decoder and predictor say of seen (batch, encode, kept), in the order of time, and h.
+        """What decoder and predictor say of seen (batch, encode, kept), in the order of time, and h."""
+        return self._told(self._state(seen, chance), true, chance, decoded)
+
+    def _state(self, seen: Tensor, chance: torch.Generator | None = None) -> tuple[Tensor, ...]:
+        """The encoder's h and C (1, batch, width) each, after seen (batch, encode, kept)."""
+        return self.encoder(self.enter(seen, chance) if self.spatial else seen)[1]
+
+    def _told(
+        self, state: tuple[Tensor, ...], true: Tensor | None = None,
+        chance: torch.Generator | None = None, decoded: bool = True,
+    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """What is said from a state, and h.
 
         true : (batch, encode + predict, kept), what both hear if they do not hear themselves.
         decoded : False leaves out the decoder's frames.
         """
-        read = self.enter(seen, chance) if self.spatial else seen
-        _, state = self.encoder(read)
         back_alone, ahead_alone = self._alone()
         back = ahead = None
         if true is not None:
@@ -274,6 +288,36 @@ class Strnn(nn.Module):
         if not isinstance(step, Integral) or not 1 <= step <= self.encode:
             raise ModelError(f"project: step is {step!r}; it must lie between 1 and {self.encode}.")
         return self._again("project", features, step)
+
+    def code(self, features: Tensor) -> Tensor:
+        """What the encoder knows after the last `encode` of features (batch, frames, dim): h and C side
+        by side, (batch, 2 width). A place on the manifold; `say` is the way back."""
+        seen, one = self._checked("code", features)
+        with at_rest(self):
+            found = torch.cat([part[0] for part in self._state(seen[:, -self.encode :])], 1)
+        return found[0] if one else found
+
+    def say(self, code: Tensor) -> Tensor:
+        """The frames (batch, encode + predict, dim) that are said of codes (batch, 2 width) of `code`;
+        of one code (2 width,) they are (encode + predict, dim).
+
+        Raises
+        ------
+        ModelError : codes of another size, or NaN.
+        """
+        size = self.codes * self.width
+        code = torch.as_tensor(code).to(self.normalizer.mean)
+        if code.ndim not in (1, 2) or code.shape[-1] != size or not bool(code.isfinite().all()):
+            raise ModelError(
+                f"say: codes of shape {tuple(code.shape)}; they must be (batch, {size}) without NaN, as "
+                "`code` gives them."
+            )
+        one = code.ndim == 1
+        state = (code[None] if one else code)[None].split(self.width, -1)
+        with at_rest(self):
+            said = self._filtered(self._told(tuple(part.contiguous() for part in state))[0])
+        said = self.normalizer.inverse(said)
+        return said[0] if one else said
 
     def _again(self, what: str, features: Tensor, step: int) -> Tensor:
         seen, one = self._checked(what, features)

@@ -117,17 +117,21 @@ class SpatialEncoder(nn.Module):
     / 2 (half a body) and `width` units (the whole, which root and contacts join).
 
     parts : of `part_channels`.
+    dense : layers of the same sizes of which all see all, as those of an ERD: no tree.
     """
 
-    def __init__(self, parts: Mapping[str, Sequence[int]], width: int, drop: float) -> None:
+    def __init__(
+        self, parts: Mapping[str, Sequence[int]], width: int, drop: float, dense: bool = False
+    ) -> None:
         super().__init__()
         body, limbs, halves, others = _sizes(parts, width)
         sizes = {name: len(channels) for name, channels in parts.items()}
         self.register_buffer("order", _order(parts), persistent=False)
         self.body = sum(body.values())
-        self.parts = Level(sizes, body | others, {name: (name,) for name in sizes}, drop)
-        self.limbs = Level(body, limbs, {limb: ("spine", limb) for limb in LIMBS}, drop)
-        self.halves = Level(limbs, halves, HALVES, drop)
+        level = _all_see_all if dense else Level
+        self.parts = level(sizes, body | others, {name: (name,) for name in sizes}, drop)
+        self.limbs = level(body, limbs, {limb: ("spine", limb) for limb in LIMBS}, drop)
+        self.halves = level(limbs, halves, HALVES, drop)
         self.whole = Level(halves | others, {"whole": width}, {"whole": (*halves, *others)}, drop)
 
     def forward(self, frames: Tensor, chance: torch.Generator | None = None) -> Tensor:
@@ -144,7 +148,9 @@ class SpatialDecoder(nn.Module):
     Each limb says something of the spine, which is made of all four.
     """
 
-    def __init__(self, parts: Mapping[str, Sequence[int]], width: int, drop: float) -> None:
+    def __init__(
+        self, parts: Mapping[str, Sequence[int]], width: int, drop: float, dense: bool = False
+    ) -> None:
         super().__init__()
         body, limbs, halves, others = _sizes(parts, width)
         spines = {limb: f"spine at {limb}" for limb in LIMBS}
@@ -152,14 +158,17 @@ class SpatialDecoder(nn.Module):
         half_of = {limb: (half,) for half, both in HALVES.items() for limb in both}
         self.register_buffer("order", _order(parts).argsort(), persistent=False)
         self.halves = sum(halves.values())
+        level = _all_see_all if dense else Level
         self.whole = Level({"whole": width}, halves | others,
                            dict.fromkeys([*halves, *others], ("whole",)), drop)  # fmt: skip
-        self.limbs = Level(halves, limbs, half_of, drop)
-        self.parts = Level(
+        self.limbs = level(halves, limbs, half_of, drop)
+        self.parts = level(
             limbs, parted, {name: (name.rpartition(" ")[2],) for name in parted}, drop
         )
         sizes = {name: len(channels) for name, channels in parts.items()}
         sees = {name: (name,) for name in sizes} | {"spine": tuple(spines.values())}
+        if dense:
+            sees = dict.fromkeys(sizes, tuple(parted | others))
         self.leave = Grouped(parted | others, sizes, sees)
 
     def forward(self, codes: Tensor, chance: torch.Generator | None = None) -> Tensor:
@@ -168,6 +177,11 @@ class SpatialDecoder(nn.Module):
         parted = self.parts(self.limbs(whole[:, : self.halves], chance), chance)
         frames = self.leave(torch.cat([parted, whole[:, self.halves :]], 1))[:, self.order]
         return frames.unflatten(0, codes.shape[:-1])
+
+
+def _all_see_all(inputs, outputs, sees, drop: float) -> Level:
+    """A level without groups."""
+    return Level(inputs, outputs, dict.fromkeys(outputs, tuple(inputs)), drop)
 
 
 def _sizes(parts: Mapping[str, Sequence[int]], width: int) -> tuple[dict[str, int], ...]:

@@ -18,12 +18,23 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import MotionLabError, TrainingError
-from ..models import AcLstm, ConvAutoencoder, Erd, LstmGmm, Refiner, Seq2Seq, Strnn
+from ..models import (
+    AcLstm,
+    BidirectionalRnn,
+    ConvAutoencoder,
+    Erd,
+    LstmGmm,
+    Refiner,
+    Seq2Seq,
+    Strnn,
+)
 from ..models.pfnn import Pfnn
 
-_MODELS = (LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn, ConvAutoencoder)
+_MODELS = (
+    LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn, ConvAutoencoder, BidirectionalRnn,
+)  # fmt: skip
 _KINDS = {kind.__name__: kind for kind in _MODELS}
-_STARTS = "starts."
+_STARTS, _FRAMES = "starts.", "frames"
 
 
 def write_whole(path: str | os.PathLike, write: Callable[[IO[bytes]], object]) -> None:
@@ -50,7 +61,7 @@ def save_weights(
     model: nn.Module,
     about: dict,
     *,
-    starts: NamedTuple | None = None,
+    starts: NamedTuple | Tensor | None = None,
     half: bool = False,
 ) -> None:
     """Weights, with what is needed to build the model again, and what is worth knowing about them.
@@ -58,7 +69,8 @@ def save_weights(
     Parameters
     ----------
     about : fit for JSON.
-    starts : a state of the model, batched, to begin motion from.
+    starts : to begin motion from: a state of the model, batched; or, of an STRNN, which has no state,
+        frames (starts, frames, dim).
     half : round the parameters to half precision. Normaliser, floors and starts are small, in both
         senses, and stay as they are.
 
@@ -71,7 +83,8 @@ def save_weights(
     if half:
         tensors |= {name: tensor.half() for name, tensor in model.named_parameters()}
     if starts is not None:
-        parts = {key: part for key, part in starts._asdict().items() if part.numel()}
+        parts = {_FRAMES: starts} if isinstance(starts, Tensor) else starts._asdict()
+        parts = {key: part for key, part in parts.items() if part.numel()}
         tensors |= {f"{_STARTS}{key}": part.clone() for key, part in parts.items()}
     _save(path, tensors, header)
 
@@ -80,7 +93,7 @@ def save_weights(
 def load_weights(path: str | os.PathLike) -> tuple[nn.Module, dict]:
     """The model that `save_weights` stored, in float32 on the CPU, and what was said about it.
 
-    The model has `starts`, the state that was stored with it, or None.
+    The model has `starts`, the state or the frames that were stored with it, or None.
 
     Raises
     ------
@@ -93,7 +106,7 @@ def load_weights(path: str | os.PathLike) -> tuple[nn.Module, dict]:
         with torch.random.fork_rng(devices=[]):  # building a model draws its first weights
             model = _KINDS[header["kind"]].from_config(header["config"])
         model.load_state_dict(tensors)
-        model.starts = None
+        model.starts = starts.pop(_FRAMES, None)
         if starts:
             model.starts = model.zero_state(len(starts["frame"]))._replace(**starts)
         return model, header["about"]

@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from ..encodings import BodyFrame, JointAngles, Normalizer
 from ..errors import TrainingError
-from ..models import Strnn
+from ..models import BidirectionalRnn, Strnn
 from ..models.strnn import ALONE, BEHIND, FIRST
 from .prepared import Prepared
 from .presets import Preset
@@ -57,8 +57,8 @@ class StrnnPreset(Preset):
 
     predict: int = 20
     """Frames that are foretold."""
-    spatial: bool = True
-    """Encode and decode frames part by part."""
+    spatial: bool | str = True
+    """Encode and decode frames part by part; "dense": by layers that know no parts."""
     residual: bool = True
     """A network over all frames that were said takes jumps out."""
     conditional: bool = True
@@ -138,6 +138,19 @@ class StrnnPreset(Preset):
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class BidirectionalPreset(StrnnPreset):
+    """Settings of a training of the bidirectional RNN, STRNN's rival under the same scheme."""
+
+    def model(self, data: Prepared) -> BidirectionalRnn:
+        """An untrained network for some data."""
+        data = in_body_frame(data)
+        return BidirectionalRnn(
+            data.encoding, data.normalizer, self.width, self.frames - self.predict, self.predict,
+            smooth=self.smooth, penalty=self.penalty,
+        )  # fmt: skip
+
+
 # Composite_20_20_HY. smoke: seconds, for tests. table: the equal budget of all rows of a comparison.
 # ship: what is shipped. paper: as the paper has it; how long an iteration is, in which the noise
 # shrinks by a hundredth of what it was, is not said there.
@@ -176,6 +189,9 @@ PRESETS = {
     "strnn-temporal": _changed(**_TEMPORAL),
     # what is shipped: the residual network behind a Temporal, which learns faster than with parts
     "strnn-temporal-hy": {name: replace(preset, spatial=False) for name, preset in _STRNN.items()},
+    "bidirectional-rnn": {
+        name: BidirectionalPreset(**vars(preset)) for name, preset in _changed(**_TEMPORAL).items()
+    },
     **{
         f"strnn-temporal-{40 - predict}-{predict}": _changed(
             **_TEMPORAL, smooth=0.0, predict=predict

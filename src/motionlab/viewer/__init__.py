@@ -7,6 +7,7 @@ from .live.dream import dream
 from .live.feeding import feeding
 from .live.knobs import knobs
 from .live.player import Player, bundle_path
+from .live.pose_map import pose_map
 from .live.show import show
 from .live.steer import steer
 from .pictures import palette
@@ -26,6 +27,7 @@ __all__ = [
     "knobs",
     "palette",
     "plots",
+    "pose_map",
     "scene",
     "show",
     "stack",

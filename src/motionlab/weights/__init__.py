@@ -71,8 +71,9 @@ def load(name_or_path: str | os.PathLike) -> nn.Module:
     Its parameters ask for no gradients, so that `generate` remembers nothing. It comes with
 
     * `starts`, a batch of states to begin from: ``starts[2]``, ``starts[:4]``. Weights of a training
-      that was not finished have a single one: that of a network which has seen the mean frame.
-    * `start_names`, what the body does in each of them, such as "walk 1.2 m/s".
+      that was not finished have a single one: that of a network which has seen the mean frame. An
+      STRNN's are frames (starts, frames, dim) of validation clips, or None.
+    * `start_names`, what the body does in each of them, such as "walk 1.2 m/s", or the clip.
     * `sampling`, arguments of `generate` that suit these weights best.
     * `familiar`, below and above which `observe` warns of strange frames; None if it is not known.
     * `hash`, sha256 of the file; `about`, how they were made; `card`, the same as Markdown.
