@@ -7,7 +7,7 @@ judged by their feet and poses, the best refined, its feet locked, and the point
 
 Then somebody steers for a minute with a key held, another one each two seconds: how long it takes from the
 click that loads the network until he has gone a decimetre, and how long one waits for each picture. Chromium
-draws without a GPU here, so that is the machine's time more than the page's; the page's own is told beside it.
+draws without a GPU here, so that is the machine's time more than the page's; what its networks take is told, too.
 """
 
 from __future__ import annotations
@@ -50,8 +50,16 @@ WALK = """([futures, round, lock]) => {
 # When pictures come and what the page did for each; when he has gone a decimetre after the click.
 WATCH = """() => {
   const figure = document.querySelector("figure.motionlab-steer").motionlab;
-  Object.assign(globalThis, { pictures: [], work: [] });
+  Object.assign(globalThis, { pictures: [], work: [], networks: [] });
   figure.go.addEventListener("click", () => { globalThis.clicked = performance.now(); }, true);
+  const time = (owner, name, found) => {
+    const act = owner[name].bind(owner);
+    owner[name] = (...given) => {
+      const began = performance.now();
+      act(...given);
+      found.push(performance.now() - began);
+    };
+  };
   const look = (now) => {
     const { player, steered } = figure;
     if (steered && !globalThis.first) {
@@ -59,12 +67,8 @@ WATCH = """() => {
       if (Math.hypot(x, z) > 0.1) globalThis.first = performance.now() - clicked;
     }
     if (steered && !player.timed) {
-      const tick = player.tick.bind(player);
-      player.tick = (seconds) => {
-        const began = performance.now();
-        tick(seconds);
-        work.push(performance.now() - began);
-      };
+      time(player, "tick", work);
+      time(steered, "reach", networks);
       player.timed = true;
     }
     if (globalThis.first) pictures.push(now);
@@ -148,18 +152,20 @@ def by_hand(page_file: Path, seconds: float, path: str) -> dict[str, float]:
             page.keyboard.down(key)
             page.wait_for_timeout(1000 * EACH)
             page.keyboard.up(key)
-        first, pictures, work = page.evaluate("[first, pictures, work]")
+        first, pictures, work, networks = page.evaluate("[first, pictures, work, networks]")
         browser.close()
     waits = sorted(later - earlier for earlier, later in pairwise(pictures))
-    work = sorted(work[-len(waits) :])
+    work, networks = sorted(work[-len(waits) :]), sorted(networks[-len(waits) :])
     return {
         "first decimetre (s)": first / 1000,
         "pictures a second": 1000 * len(waits) / sum(waits),
         "picture, median (ms)": statistics.median(waits),
         "picture, longest (ms)": waits[-1],
         f"pictures that took over {LONGEST} ms (%)": 100 * mean(each > LONGEST for each in waits),
-        "page's own work for one, median (ms)": statistics.median(work),
-        "page's own work for one, longest (ms)": work[-1],
+        "page's work for one, drawn, median (ms)": statistics.median(work),
+        "page's work for one, drawn, longest (ms)": work[-1],
+        "networks' part of it, median (ms)": statistics.median(networks),
+        "networks' part of it, longest (ms)": networks[-1],
     }
 
 

@@ -191,6 +191,17 @@ def test_two_are_steered_by_the_same_keys(visit):
     assert not page.get_by_label("Futures (K)").count()
 
 
+def test_shaders_of_the_clip_serve_who_is_steered(visit):
+    """To make them anew takes a second of the two until the first step, where no graphics card is."""
+    page = visit().page
+    until(page, "figure.player.frame > 2")
+    programs = "__motionlab_stage_2.renderer.info.programs.map(({ id }) => id)"
+    before = page.evaluate(programs)
+    load(page)
+    frames_pass(page, 3)
+    assert before and set(before) <= set(page.evaluate(programs))
+
+
 def test_another_network_can_be_taken(visit):
     page = visit().page
     load(page)

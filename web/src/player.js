@@ -102,7 +102,7 @@ export class Player {
     if (!this.stage) return this.sayMissing();
     // Pixels of the picture per pixel of the page: while it rests, and while it moves.
     this.fine ??= this.stage.software ? 1.5 : Math.min(globalThis.devicePixelRatio || 1, 2);
-    this.coarse ??= this.stage.software ? 1 : this.fine;
+    this.coarse ??= this.stage.coarse ?? (this.stage.software ? 1 : this.fine);
     this.casts = this.tracks.map((track, i) => this.cast(track, i));
     this.dirty = true;
   }
@@ -350,6 +350,7 @@ export class Player {
     this.pace = 0.9 * (this.pace ?? SLOW / 2) + 0.1 * seconds;
     if (this.pace > SLOW && this.coarse > 0.75) {
       this.coarse *= 0.85;
+      if (this.stage) this.stage.coarse = this.coarse; // who comes next need not find out again
       this.pace = undefined;
     }
   }

@@ -22,6 +22,7 @@ class Stage {
   constructor({ canvas, software, ...context }) {
     this.software = software;
     this.players = new Set(); // who are seen
+    this.kept = new Set(); // programs
     this.gone = false; // then there will be another; a browser, too, may take it away
     canvas.addEventListener("webglcontextlost", () => { this.gone = true; });
     this.renderer = new WebGLRenderer({ canvas, ...context });
@@ -49,8 +50,7 @@ class Stage {
   draw(canvas, views, theme, ratio) {
     const width = canvas.width / ratio;
     const height = canvas.height / ratio;
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height, false);
+    this.resize(width, height, ratio);
     this.ground.paint(theme);
     this.sky.intensity = theme.sky;
     this.rim.intensity = theme.rim;
@@ -66,7 +66,24 @@ class Stage {
       this.renderer.setScissor(view.x, bottom, view.width, view.height);
       this.renderer.render(this.scene, view.aim());
     }
+    this.keepPrograms();
     hand(this.renderer.domElement, canvas);
+  }
+
+  /** Once, and only if there is need: each time the browser makes another buffer. */
+  resize(width, height, ratio) {
+    const size = [width, height, ratio].join();
+    if (size !== this.size) this.renderer.setDrawingBufferSize(width, height, ratio);
+    this.size = size;
+  }
+
+  /** Shaders stay as long as the stage: the next figure needs the same ones, and to make them anew may take a second. */
+  keepPrograms() {
+    for (const program of this.renderer.info.programs) {
+      if (this.kept.has(program)) continue;
+      this.kept.add(program);
+      program.usedTimes++; // three lets go of what nobody uses
+    }
   }
 
   /** A player is seen no more, and needs no picture; if nobody is for a while, the stage goes. */

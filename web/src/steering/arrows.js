@@ -1,5 +1,5 @@
 // Two arrows on the ground around who is steered: which way and how fast he is asked to go, and goes.
-import { BufferGeometry, DoubleSide, Float32BufferAttribute, Group, Mesh, MeshBasicMaterial } from "three";
+import { BufferGeometry, Float32BufferAttribute, Group, Mesh, MeshBasicMaterial } from "three";
 import { STILL } from "./aim.js";
 
 export const ASKED = "#5b5fc7";
@@ -13,7 +13,8 @@ function arrow(color, width) {
   const corners = [[w, 0], [-w, 0], [w, 0.8], [w, 0.8], [-w, 0], [-w, 0.8], [h, 0.8], [-h, 0.8], [0, 1]];
   const flat = new BufferGeometry();
   flat.setAttribute("position", new Float32BufferAttribute(corners.flatMap(([x, z]) => [x, 0, z]), 3));
-  const paint = new MeshBasicMaterial({ color, side: DoubleSide, transparent: true, opacity: 0.9, depthWrite: false });
+  // seen from above; of one side only, for which contacts have a shader already
+  const paint = new MeshBasicMaterial({ color, transparent: true, opacity: 0.9, depthWrite: false });
   const mesh = new Mesh(flat, paint);
   mesh.renderOrder = -1;
   return mesh;
