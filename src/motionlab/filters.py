@@ -188,11 +188,14 @@ def _joined(motion: Motion, numbers: np.ndarray, mean: Tensor) -> Motion:
 def _unwrapped(turns: Tensor) -> Tensor:
     """Rotation vectors (frames, joints, 3), each of the whole turns that is nearest to the one before."""
     found = turns.clone()
-    for frame in range(1, len(found)):
-        size = found[frame].norm(dim=-1, keepdim=True)
-        axis = found[frame] / size.clamp(min=1e-9)
-        along = (found[frame - 1] * axis).sum(-1, keepdim=True)
-        found[frame] += axis * (2 * torch.pi) * ((along - size) / (2 * torch.pi)).round()
+    jumps = (turns.diff(dim=0).norm(dim=-1) > torch.pi).any(0)  # others are near all the time
+    some = found[:, jumps]
+    for frame in range(1, len(some) if jumps.any() else 0):
+        size = some[frame].norm(dim=-1, keepdim=True)
+        axis = some[frame] / size.clamp(min=1e-9)
+        along = (some[frame - 1] * axis).sum(-1, keepdim=True)
+        some[frame] += axis * (2 * torch.pi) * ((along - size) / (2 * torch.pi)).round()
+    found[:, jumps] = some
     return found
 
 

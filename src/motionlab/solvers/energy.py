@@ -59,6 +59,7 @@ class Energy:
     terms : wishes by name, of `terms` or your own; "prior" and "noise" are always there.
     weights : factor on a term by its name, 1 where none is given; or factors (batch,), a window each.
         A weight of 0 for all leaves it out.
+    foretold : bool (batch, frames), of which frames the network has a say. None: of all.
 
     Raises
     ------
@@ -71,12 +72,13 @@ class Energy:
         before: Before,
         terms: Mapping[str, Term] | None = None,
         weights: Mapping[str, float | Tensor] | None = None,
+        foretold: Tensor | None = None,
     ) -> None:
         if not isinstance(model, LstmGmm):
             raise SolverError(
                 f"{type(model).__name__} has no likelihood to weigh wishes against; take an LstmGmm."
             )
-        self.model, self.before = model, before
+        self.model, self.before, self.foretold = model, before, foretold
         self.terms, self.weights = dict(terms or {}), dict(weights or {})
         known = [*OWN, *self.terms]
         for name, weight in self.weights.items():
@@ -87,11 +89,11 @@ class Energy:
         if twice := set(OWN) & set(self.terms):
             raise SolverError(f"{sorted(twice)} are the energy's own terms; take other names.")
 
-    def __call__(self, s: Tensor, d: Tensor) -> Tensor:
+    def __call__(self, s: Tensor, d: Tensor, before: Before | None = None) -> Tensor:
         """Energy (batch,) of windows; arguments as of `parts`."""
-        return sum(self.parts(s, d).values())
+        return sum(self.parts(s, d, before).values())
 
-    def parts(self, s: Tensor, d: Tensor) -> dict[str, Tensor]:
+    def parts(self, s: Tensor, d: Tensor, before: Before | None = None) -> dict[str, Tensor]:
         """Each term by its name, weighed: (batch,) in nats.
 
         Parameters
@@ -99,38 +101,45 @@ class Energy:
         s : (batch, frames, kept), the motion in normalised units.
         d : (batch, frames, dim), what disturbs the network's inputs, in normalised units. That of
             the last frame matters to what follows the window only.
+        before : where the windows begin, if not where the energy's own do: that may be sought, too.
         """
+        before = self.before if before is None else before
         each = {name for name, weight in self.weights.items() if getattr(weight, "ndim", 0)}
         wanted = lambda name: name in each or self.weights.get(name, 1.0) > 0
         found = {}
         features = self.model.normalizer.inverse(s)
         if wanted("prior"):
-            found["prior"] = -self.mixture(features, d).log_prob(s).sum(1)
+            likely = self.mixture(features, d, before).log_prob(s)
+            found["prior"] = -(likely if self.foretold is None else likely * self.foretold).sum(1)
         if wanted("noise"):
             found["noise"] = (d / NOISE).square().flatten(1).sum(1) / 2
         if terms := {name: term for name, term in self.terms.items() if wanted(name)}:
-            rows = self.decoded(features, _looked_at(terms.values()))
+            rows = self.decoded(features, _looked_at(terms.values()), before)
             found |= {name: term(*rows) for name, term in terms.items()}
         return {name: self.weights.get(name, 1.0) * value for name, value in found.items()}
 
-    def mixture(self, features: Tensor, d: Tensor) -> Mixture:
+    def mixture(self, features: Tensor, d: Tensor, before: Before | None = None) -> Mixture:
         """What the network says of each frame of features (batch, frames, dim) before it sees it."""
-        first = self.model.predict(self.before.state)
+        state = (self.before if before is None else before).state
+        first = self.model.predict(state)
         if features.shape[1] == 1:
             return Mixture(*(part[:, None] for part in first))
-        rest, _ = self.model.read(features[:, :-1], self.before.state, d[:, :-1])
+        rest, _ = self.model.read(features[:, :-1], state, d[:, :-1])
         return Mixture(*(torch.cat([a[:, None], b], 1) for a, b in zip(first, rest, strict=True)))
 
     def decoded(
-        self, features: Tensor, points: frozenset[int] | None = None
+        self,
+        features: Tensor,
+        points: frozenset[int] | None = None,
+        before: Before | None = None,
     ) -> tuple[Tensor, Tensor, Tensor | None]:
         """What a term gets: features, positions and contacts, with the frame before as row 0.
 
         points : those that will be looked at; the others may be NaN. None: all.
         """
-        encoding = self.model.encoding
-        features = torch.cat([self.before.frame[:, None], features], dim=1)
+        before, encoding = self.before if before is None else before, self.model.encoding
+        features = torch.cat([before.frame[:, None], features], dim=1)
         some = {"points": points} if isinstance(encoding, JointAngles) else {}
-        positions = encoding.positions(features, self.before.place, **some)
+        positions = encoding.positions(features, before.place, **some)
         has = "contacts" in encoding.slices
         return features, positions, encoding.contacts(features) if has else None

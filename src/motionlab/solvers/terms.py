@@ -253,6 +253,22 @@ def places(
     return term
 
 
+def headings(wanted: Tensor, mask: Tensor | None = None, std: float = ANGLE) -> Term:
+    """The root faces the way that it was seen to face (eq. 26, the root's turn).
+
+    Parameters
+    ----------
+    wanted : (batch, frames) radians from where it faced in row 0, more than half a turn if need be.
+    mask : bool, like wanted, which were seen. None: all.
+    """
+
+    @_looking_at()
+    def term(features: Tensor, positions: Tensor, contacts: Tensor | None) -> Tensor:
+        return _seen(features[:, 1:, 2].cumsum(1), wanted, mask, std)
+
+    return term
+
+
 def channels(
     wanted: Tensor, which: slice, mask: Tensor | None = None, std: Tensor | float = ANGLE
 ) -> Term:

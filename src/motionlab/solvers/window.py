@@ -59,7 +59,19 @@ def solve(
     So it is never worse than the guess. method : one of `METHODS`; steps : of it. enough : asked before
     each step of Adam; it may say that time is up.
     """
-    search = _Search(energy, s, d)
+    search = Search(energy, s, d)
+    descend(search, method, steps, generator, enough)
+    return Solved(*search.at(search.best), search.least, search.evaluations)
+
+
+def descend(
+    search: Search,
+    method: str,
+    steps: int,
+    generator: torch.Generator | None = None,
+    enough: Callable[[], bool] = lambda: False,
+) -> None:
+    """Let a search look about until it has its best; arguments as of `solve`."""
     free = search.zero()
     if method == "adam":
         _adam(search, free, steps, enough)
@@ -71,10 +83,9 @@ def solve(
             _lbfgs(search, search.best, steps)
     else:
         search.look(free)
-    return Solved(*search.at(search.best), search.least, search.evaluations)
 
 
-class _Search:
+class Search:
     """An energy over free numbers (batch, n), zero at the first guess; remembers the best."""
 
     def __init__(self, energy: Energy, s: Tensor, d: Tensor) -> None:
@@ -126,7 +137,7 @@ def spread(mixture: Mixture, s: Tensor) -> Tensor:
     return mixture.stds.gather(-2, which)[..., 0, :]
 
 
-def _adam(search: _Search, free: Tensor, steps: int, enough: Callable[[], bool]) -> None:
+def _adam(search: Search, free: Tensor, steps: int, enough: Callable[[], bool]) -> None:
     """Written out, since a window's own best must be seen at each step."""
     first, second = torch.zeros_like(free), torch.zeros_like(free)
     for t in range(1, steps + 1):
@@ -142,7 +153,7 @@ def _adam(search: _Search, free: Tensor, steps: int, enough: Callable[[], bool])
         search.look(free)
 
 
-def _lbfgs(search: _Search, free: Tensor, steps: int) -> None:
+def _lbfgs(search: Search, free: Tensor, steps: int) -> None:
     free = free.clone().requires_grad_()
     optimizer = torch.optim.LBFGS(
         [free], max_iter=steps, max_eval=2 * steps, history_size=20, line_search_fn="strong_wolfe"
@@ -158,7 +169,7 @@ def _lbfgs(search: _Search, free: Tensor, steps: int) -> None:
     optimizer.step(closure)
 
 
-def _swarm(search: _Search, free: Tensor, steps: int, generator: torch.Generator | None) -> None:
+def _swarm(search: Search, free: Tensor, steps: int, generator: torch.Generator | None) -> None:
     """Each window its own swarm; energies are asked for particle after particle, in one batch of
     windows each."""
 
