@@ -4,13 +4,17 @@
     clean.motion, clean.record["noise"]
 
 Of all motions, which is both likely under the network and near to what was seen (eq. 25 to 27)? A filter
-knows that bodies are slow to turn; the network knows how they walk.
+knows that bodies are slow to turn; the network knows how they walk. Where it does not know how they
+move, the filter's answer is the better one, and is what comes back; see `denoise_known`.
+
+A recording of any rig, at any rate: `denoise_rig.clean_recording`.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,10 +22,24 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from ..encodings import JointAngles
 from ..feet.contacts import label
+from ..models import LstmGmm
 from ..motion import Motion
 from ..weights import load
+from .denoise_checks import (
+    check_clip,
+    check_levels,
+    check_model,
+    check_settings,
+    mask_of,
+    start_of,
+    theirs,
+)
+from .denoise_known import judge
 from .denoise_seen import (
+    LEAST_ANGLE,
+    LEAST_ROOT,
     NoiseLevels,
     Seen,
     joints_of,
@@ -34,6 +52,8 @@ from .denoise_seen import (
 from .denoise_windows import Cleaned, Job, Settings, clean
 
 MODEL = "lstm-gmm-contacts"
+# m/s below which a toe is taken to rest while noise is still left on it; the labels' own is 0.45
+SLOW = 0.6
 
 
 class Denoised(NamedTuple):
@@ -49,75 +69,183 @@ def denoise(
     *,
     noise: NoiseLevels | tuple[float, float] | None = None,
     missing: Tensor | Sequence[Tensor | None] | None = None,
-    start: Motion | Sequence[Motion] | None = None,
+    start: Motion | Sequence[Motion | None] | None = None,
     contacts: bool = True,
     settings: Settings | None = None,
     generator: torch.Generator | None = None,
     progress: bool = False,
 ) -> Denoised | list[Denoised]:
-    """The likeliest motion, given a noisy one.
+    """The likeliest motion, given a noisy one (RNN-GAN, eq. 25).
 
     Parameters
     ----------
     motions : on the model's skeleton, at its rate; or a list, which is cleaned side by side.
-    model : with a likelihood, on `JointAngles`; None: the shipped lstm-gmm-contacts.
+    model : with a likelihood, on `JointAngles` of rotation vectors, its weights or their name; None:
+        the shipped lstm-gmm-contacts.
     noise : standard deviations of the root's place in metres and of angles in radians; None: told by
-        the clips themselves (see `denoise_seen.levels_of`).
-    missing : bool (frames,) or (frames, joints), true where nothing was seen; a list for a list.
+        each clip itself (`denoise_seen.levels_of`).
+    missing : bool (frames,) or (frames, joints), true where nothing was seen; a list for a list. What
+        the motion says there is not looked at.
     start : smooth motions to begin with, such as a filter made; None: ours (`denoise_seen.smooth`).
-    contacts : whether feet that the network says are down are to stand (eq. 19).
-    settings : see `Settings`.
+    contacts : whether feet that are down are to stand (eq. 19).
+    settings : see `denoise_windows.Settings`.
     generator : source of chance, of which there is none unless the method is a swarm.
     progress : show a bar.
+
+    Returns
+    -------
+    Denoised : or a list, for a list. Its `motion` has contacts, of heels and toes. Its `record` has
+
+        * "noise": "root_m", "angle_rad", and whether they were "estimated";
+        * "outliers": frames that were seen and not believed; "missing": share of joints not seen;
+        * "way": "map", the likeliest motion; "filter", where the network does not know such motion
+          and the smooth line is what comes back; "unchanged", where there was nothing to clean;
+        * "likelihood" of the smooth line, nats a frame, and "least", below which it is not known;
+        * "changed (cm)": farthest that a joint was moved, where it was seen;
+        * "energy": nats a frame of each term, weighed; "evaluations" of it;
+        * "seconds": of the processor, the clip's share.
+
+    Raises
+    ------
+    SolverError : a clip of too few frames, another rate or body, or of no person's size; a mask of
+        another shape, or of all joints; levels or settings that make no sense; a model that has no
+        likelihood. Nothing is cleaned then.
     """
     alone = isinstance(motions, Motion)
     clips = [motions] if alone else list(motions)
-    model = load(MODEL if model is None else model) if not isinstance(model, nn.Module) else model
+    model = model if isinstance(model, nn.Module) else load(MODEL if model is None else model)
     how = settings or Settings()
-    if not contacts:
-        how = replace(how, contact=0.0)
-    masks = [missing] * len(clips) if alone or missing is None else list(missing)
-    starts = [start] * len(clips) if alone or start is None else list(start)
+    how = how if contacts else replace(how, contact=0.0)
+    check_model(model)
+    check_settings(how)
+    masks = theirs("missing", missing, len(clips), alone)
+    starts = theirs("start", start, len(clips), alone)
+    for clip in clips:
+        check_clip(model.encoding, clip)
     begin = time.process_time()
-    grads = [p.requires_grad for p in model.parameters()]
-    model.requires_grad_(False)
+    seen = [see(model.encoding, clip, noise, mask) for clip, mask in zip(clips, masks, strict=True)]
     jobs = [
-        _job(model, clip, noise, mask, first)
-        for clip, mask, first in zip(clips, masks, starts, strict=True)
+        Job(its, levels, _begin(model.encoding, clip, its, levels, first))
+        for clip, (its, levels), first in zip(clips, seen, starts, strict=True)
     ]
-    with tqdm(total=sum(map(len, clips)), unit="frame", disable=not progress, leave=False) as bar:
-        found = clean(model, jobs, how, bar.update)
-    for p, g in zip(model.parameters(), grads, strict=True):
-        p.requires_grad_(g)
-    seconds = (time.process_time() - begin) / sum(map(len, clips))
-    done = [
-        _denoised(model, clip, job, its, noise is None, seconds * len(clip))
-        for clip, job, its in zip(clips, jobs, found, strict=True)
+    with torch.no_grad(), _weights_alone(model):
+        done = clean_jobs(model, jobs, how, generator, progress)
+    share = (time.process_time() - begin) / max(1, sum(map(len, clips)))
+    found = [
+        _denoised(model.encoding, clip, job, its, noise is None, share * len(clip))
+        for clip, job, its in zip(clips, jobs, done, strict=True)
     ]
-    return done[0] if alone else done
+    return found[0] if alone else found
 
 
-def _job(model, clip, noise, missing, start) -> Job:
+class Done(NamedTuple):
+    """rows (frames, channels) of a clean clip; way : as of `denoise`; what else the record tells."""
+
+    rows: Tensor
+    way: str
+    likelihood: float
+    least: float
+    cleaned: Cleaned | None
+
+
+def clean_jobs(
+    model: LstmGmm,
+    jobs: list[Job],
+    how: Settings,
+    generator: torch.Generator | None = None,
+    progress: bool = False,
+) -> list[Done]:
+    """The best known answer to each job: those that need nothing are left, the others solved together."""
     encoding = model.encoding
-    rows = rows_of(encoding, clip)
-    mask = torch.ones(len(clip), encoding.skeleton.joints, dtype=torch.bool)
-    if missing is not None:
-        mask &= ~(missing if missing.ndim == 2 else missing[:, None])
-    seen = Seen(rows, joints_of(encoding, mask), torch.zeros(len(clip), dtype=torch.bool))
-    levels = levels_of(seen) if noise is None else NoiseLevels(*noise)
+    needed = [job for job in jobs if not needs_nothing(job)]
+    lines = {id(job): job.rows for job in needed}
+    total = how.rounds * sum(len(job.rows) for job in needed)
+    found: list[Cleaned] = []
+    with tqdm(total=total, unit="frame", disable=not progress, leave=False) as bar:
+        for _ in range(how.rounds if needed else 0):
+            for job in needed:
+                job.contacts = resting(encoding, job.rows, SLOW)[:, [1, 3]].double()
+            found = clean(model, needed, how, generator, bar.update)
+            for job, its in zip(needed, found, strict=True):
+                job.rows = its.rows
+    cleaned = {id(job): its for job, its in zip(needed, found, strict=True)}
+    done = []
+    for job in jobs:
+        if id(job) not in cleaned:
+            done.append(Done(job.seen.rows, "unchanged", float("nan"), float("nan"), None))
+            continue
+        line, its = lines[id(job)], cleaned[id(job)]
+        likelihood, least = judge(model, line, resting(encoding, line, SLOW)[:, [1, 3]], job.noise)
+        known = likelihood >= least
+        done.append(
+            Done(its.rows if known else line, "map" if known else "filter", likelihood, least, its)
+        )
+    return done
+
+
+def see(
+    encoding: JointAngles, clip: Motion, noise: tuple | None, missing: Tensor | None
+) -> tuple[Seen, NoiseLevels]:
+    """A clip as it was seen, and its noise, estimated if it is not given."""
+    mask = joints_of(mask_of(clip, missing))
+    seen = Seen(rows_of(encoding, clip, mask), mask, torch.zeros(len(clip), dtype=torch.bool))
+    levels = levels_of(seen) if noise is None else check_levels(noise)
     seen.outliers = outliers_of(seen, levels)
-    smoothed = smooth(seen, levels) if start is None else rows_of(encoding, start)
-    toes = label(motion_of(encoding, smoothed, clip, torch.zeros(len(clip), 2)))[:, [1, 3]]
-    return Job(seen, levels, smoothed, toes.double())
+    return seen, levels
 
 
-def _denoised(model, clip, job: Job, found: Cleaned, estimated: bool, seconds: float) -> Denoised:
-    motion = motion_of(model.encoding, found.rows, clip, found.contacts)
-    record = {
+def needs_nothing(job: Job) -> bool:
+    """Whether all was seen, believed, and is as smooth as clean motion."""
+    calm = job.noise.root_m < LEAST_ROOT and job.noise.angle_rad < LEAST_ANGLE
+    return calm and bool(job.seen.believed.all())
+
+
+def resting(encoding: JointAngles, rows: Tensor, speed: float = 0.45) -> Tensor:
+    """Whether heels and toes (frames, 4) of rows rest, by the paper's rule."""
+    return label(motion_of(encoding, rows), speed=speed)
+
+
+def _begin(
+    encoding: JointAngles, clip: Motion, seen: Seen, levels: NoiseLevels, start: Motion | None
+) -> Tensor:
+    """Rows of the smooth line that the search begins with."""
+    if start is None:
+        return smooth(seen, levels, encoding.fps)
+    return rows_of(encoding, start_of(clip, start))
+
+
+def _denoised(
+    encoding: JointAngles, clip: Motion, job: Job, done: Done, estimated: bool, seconds: float
+) -> Denoised:
+    if done.way == "unchanged":
+        motion = clip
+    else:
+        motion = motion_of(encoding, done.rows, clip)
+        motion = replace(motion, contacts=label(motion))
+    far = (motion.positions() - clip.positions()).norm(dim=-1)[:, : encoding.skeleton.joints]
+    its = done.cleaned
+    return Denoised(motion, {
         "noise": {**job.noise._asdict(), "estimated": estimated},
         "outliers": job.seen.outliers.nonzero()[:, 0].tolist(),
-        "energy": found.parts,
-        "evaluations": found.evaluations,
+        "missing": 1 - float(job.seen.mask[:, 5::3].double().mean()),
+        "way": done.way,
+        "likelihood": done.likelihood,
+        "least": done.least,
+        "changed (cm)": 100 * float(far[job.seen.mask[:, 5::3]].max()),
+        "energy": its.parts if its else {},
+        "evaluations": its.evaluations if its else 0,
         "seconds": seconds,
-    }
-    return Denoised(motion, record)
+    })  # fmt: skip
+
+
+@contextmanager
+def _weights_alone(model: nn.Module) -> Iterator[None]:
+    """No weight asks for a gradient: what is sought is the motion, and that is faster."""
+    asked = [weight for weight in model.parameters() if weight.requires_grad]
+    for weight in asked:
+        weight.requires_grad_(False)
+    try:
+        yield
+    finally:
+        for weight in asked:
+            weight.requires_grad_(True)

@@ -8,7 +8,7 @@ frame to frame, which a network reads, have not: an error in one place is in two
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ ROOT, YAW, TURNS = slice(0, 3), 3, slice(3, None)  # channels of rows: metres, r
 ORDER = 4  # of the differences that show noise: a body's are small there, and noise adds up
 # What is left of clean motion there, for which no one needs a cleaner: m, rad.
 LEAST_ROOT, LEAST_ANGLE = 0.001, 0.004
+FPS = 30.0  # of what is said a frame
 # Accelerations, m and rad a frame², that a body is free to have; chosen on validation clips.
 PUSH_ROOT, PUSH_ANGLE = 0.0035, 0.016
 OUTLIER = 4.0  # deviations of a frame's usual distance from its neighbours' median
@@ -55,12 +56,15 @@ class Seen:
         return self.mask & ~self.outliers[:, None]
 
 
-def rows_of(encoding: JointAngles, motion: Motion, unwrapped: bool = True) -> Tensor:
-    """Rows (frames, channels) of a motion on the encoding's body, float64."""
+def rows_of(encoding: JointAngles, motion: Motion, mask: Tensor | None = None) -> Tensor:
+    """Rows (frames, channels) of a motion on the encoding's body, float64.
+
+    mask : bool, like rows, what was seen; the yaw turns on from one frame that was to the next.
+    """
     features = encoding.encode(motion).double()
     yaw = heading(motion.rotations[:, 0].double())
-    if unwrapped:
-        yaw = torch.from_numpy(np.unwrap(yaw.numpy()))
+    there = torch.ones(len(yaw), dtype=torch.bool) if mask is None else mask[:, YAW]
+    yaw[there] = torch.from_numpy(np.unwrap(yaw[there].numpy()))
     pose = features[:, encoding.slices["pose"]]
     return torch.cat([motion.root_positions.double(), yaw[:, None], features[:, 4:6], pose], dim=1)
 
@@ -73,15 +77,15 @@ def features_of(encoding: JointAngles, rows: Tensor, contacts: Tensor | None) ->
     return torch.cat(parts, dim=1).float()
 
 
-def motion_of(encoding: JointAngles, rows: Tensor, like: Motion, contacts: Tensor | None) -> Motion:
-    """The motion of rows (frames, channels), called like another."""
-    toes = None if contacts is None else contacts[:, -2:]
-    start = rows[0, [0, 2, YAW]]
-    features = features_of(encoding, rows, toes)
-    return encoding.to_motion(features, start, like.name, like.source)
+def motion_of(encoding: JointAngles, rows: Tensor, like: Motion | None = None) -> Motion:
+    """The motion of rows (frames, channels), without contacts, called like another."""
+    features = features_of(encoding, rows, torch.zeros(len(rows), 2))
+    names = ("", "") if like is None else (like.name, like.source)
+    found = encoding.to_motion(features, rows[0, [0, 2, YAW]], *names)
+    return replace(found, contacts=None)
 
 
-def joints_of(encoding: JointAngles, mask: Tensor) -> Tensor:
+def joints_of(mask: Tensor) -> Tensor:
     """A mask (frames, joints) for channels (frames, channels): the root's six, three of each other."""
     root, others = mask[:, :1].expand(-1, 6), mask[:, 1:].repeat_interleave(3, dim=1)
     return torch.cat([root, others], dim=1)
@@ -122,7 +126,7 @@ def outliers_of(seen: Seen, noise: NoiseLevels) -> Tensor:
     return far > usual + OUTLIER * torch.maximum(spread, 0.25 * usual)
 
 
-def smooth(seen: Seen, noise: NoiseLevels) -> Tensor:
+def smooth(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:
     """Rows (frames, channels) on a line with as little acceleration as what was seen allows.
 
     For each channel that is ``min Σ (seen - x)² / σ² + Σ (x'')² / a²``, what a Kalman smoother finds
@@ -133,6 +137,7 @@ def smooth(seen: Seen, noise: NoiseLevels) -> Tensor:
     pushes = torch.full((seen.rows.shape[1],), PUSH_ANGLE).double()
     levels = torch.full_like(pushes, max(noise.angle_rad, LEAST_ANGLE))
     pushes[ROOT], levels[ROOT] = PUSH_ROOT, max(noise.root_m, LEAST_ROOT)
+    pushes *= (FPS / fps) ** 1.5  # pushes without a memory add up so
     return whittaker(seen.rows, believed, (levels / pushes).square())
 
 

@@ -22,6 +22,9 @@ from .energy import Before, Energy
 from .window import Search, descend
 
 _TILT, _STEP = slice(4, 6), 3  # channels of features: tilt; the first ones are the step's
+# Frames over which a change spreads to both sides; what is sought is as smooth as the line that it is
+# added to, so that little noise can come back with it.
+SPREAD = 1.5
 LOOSE = 0.5  # of the noise, by which a window may begin elsewhere than the smooth line
 
 
@@ -31,7 +34,8 @@ class Settings:
 
     window, overlap : frames of a window, and of those that it shares with the next.
     memory : frames of the smooth line that are read before a window.
-    method, steps : of `window.solve`. batch : windows that are solved side by side.
+    rounds : times that it is done; each begins with what the one before it found, and with feet down
+        where they are slow there. method, steps : of `window.solve`, in each. batch : windows that are solved side by side.
     prior, contact : factors on these terms (eq. 16, 19), 0 leaves one out. The observation's is 1.
     disturbed : whether the network's inputs may be disturbed, d of eq. 17.
     first_state : whether the memory before a clip's first frame is found by gradient (eq. 27).
@@ -41,9 +45,10 @@ class Settings:
     overlap: int = 16
     memory: int = 24
     method: str = "adam"
-    steps: int = 30
+    steps: int = 20
+    rounds: int = 3
     batch: int = 32
-    prior: float = 1.0
+    prior: float = 0.4
     contact: float = 1.0
     disturbed: bool = False
     first_state: bool = False
@@ -59,15 +64,14 @@ class Job:
     seen: Seen
     noise: NoiseLevels
     rows: Tensor
-    contacts: Tensor
+    contacts: Tensor | None = None
 
 
 @dataclass
 class Cleaned:
-    """rows and contacts as of `Job`; parts : nats a frame of each term; evaluations : of an energy."""
+    """rows as of `Job`; parts : nats a frame of each term; evaluations : of an energy."""
 
     rows: Tensor
-    contacts: Tensor
     parts: dict[str, float]
     evaluations: int
 
@@ -85,17 +89,18 @@ def clean(
     model: LstmGmm,
     jobs: list[Job],
     how: Settings,
+    generator: torch.Generator | None = None,
     done: Callable[[int], None] = lambda frames: None,
 ) -> list[Cleaned]:
     """The likeliest motion of each clip, given what was seen (eq. 25). done : told of frames solved."""
     features = [features_of(model.encoding, job.rows, job.contacts) for job in jobs]
     windows = [w for i, job in enumerate(jobs) for w in _windows(i, len(job.rows), how)]
-    sums = [torch.zeros(len(job.rows), job.rows.shape[1] + 2).double() for job in jobs]
+    sums = [torch.zeros(len(job.rows), job.rows.shape[1]).double() for job in jobs]
     parts: list[list[tuple[int, dict[str, float]]]] = [[] for _ in jobs]
     evaluations = [0] * len(jobs)
     for chunk in torch.arange(len(windows)).split(how.batch):
         some = [windows[i] for i in chunk.tolist()]
-        rows, said, times = _solve(model, jobs, features, some, how)
+        rows, said, times = _solve(model, jobs, features, some, how, generator)
         for k, window in enumerate(some):
             job = jobs[window.clip]
             share = _share(window, len(job.rows), how)
@@ -106,7 +111,7 @@ def clean(
             evaluations[window.clip] += times
         done(sum(window.real for window in some))
     return [
-        Cleaned(total[:, :-2], total[:, -2:], _a_frame(said), times)
+        Cleaned(total, _a_frame(said), times)
         for total, said, times in zip(sums, parts, evaluations, strict=True)
     ]
 
@@ -135,9 +140,14 @@ def _a_frame(parts: list[tuple[int, dict[str, float]]]) -> dict[str, float]:
 
 
 def _solve(
-    model: LstmGmm, jobs: list[Job], features: list[Tensor], windows: list[_Window], how: Settings
+    model: LstmGmm,
+    jobs: list[Job],
+    features: list[Tensor],
+    windows: list[_Window],
+    how: Settings,
+    generator: torch.Generator | None,
 ) -> tuple[Tensor, dict[str, Tensor], int]:
-    """Rows (batch, frames, channels + 2) of windows, with contacts, their terms, and how often asked."""
+    """Rows (batch, frames, channels) of windows, their terms, and how often asked."""
     before = _before(model, jobs, features, windows, how)
     cut = lambda each, fill=None: torch.stack([
         _cut(each[w.clip], w, how.window, fill) for w in windows
@@ -147,16 +157,15 @@ def _solve(
     foretold = real.clone()
     foretold[:, 0] = False  # so it may begin where it likes
     levels = torch.tensor([jobs[w.clip].noise for w in windows])
-    energy = Energy(
-        model, before, _wishes(model, jobs, cut, before, levels, how),
-        {"prior": how.prior, "contact": how.contact}
-        if "contacts" in model.encoding.slices else {"prior": how.prior}, foretold,
-    )  # fmt: skip
+    wishes = _wishes(model, jobs, cut, before, levels, how)
+    weights = {"prior": how.prior, "contact": how.contact}
+    weights = {name: w for name, w in weights.items() if name == "prior" or name in wishes}
+    energy = Energy(model, before, wishes, weights, foretold)
     d = torch.zeros(*s.shape[:2], model.encoding.dim)
     search = _FromSomewhere(
         energy, s, d, levels, torch.tensor([w.first == 0 for w in windows]), how
     )
-    descend(search, how.method, how.steps)
+    descend(search, how.method, how.steps, generator)
     with torch.no_grad():
         s, d, before = search.at(search.best)
         said = energy.parts(s, d, before)
@@ -164,10 +173,9 @@ def _solve(
         whole = torch.cat([before.frame[:, None], found], 1)
         path = model.encoding.root_path(whole.double(), before.place)[:, 1:]
         yaw = before.place[:, 2:] + found[..., 2].double().cumsum(1)
-        contacts = found[..., model.encoding.slices.get("contacts", slice(0, 2))].double()
         pose = found[..., model.encoding.slices["pose"]].double()
         tilt = found[..., _TILT].double()
-    return torch.cat([path, yaw[..., None], tilt, pose, contacts], -1), said, search.evaluations
+    return torch.cat([path, yaw[..., None], tilt, pose], -1), said, search.evaluations
 
 
 def _cut(clip: Tensor, window: _Window, length: int, fill: bool | None) -> Tensor:
@@ -238,6 +246,9 @@ class _FromSomewhere(Search):
         self, energy: Energy, s: Tensor, d: Tensor, levels: Tensor, begins: Tensor, how: Settings
     ) -> None:
         super().__init__(energy, s, d)
+        frames = torch.arange(s.shape[1]).to(s)
+        near = (-((frames[:, None] - frames) / SPREAD).square() / 2).exp()
+        self.lasting = near / near.square().sum(1, keepdim=True).sqrt()
         root, angle = levels.float().T
         std = energy.model.normalizer.std
         self.loose = LOOSE * torch.stack([root, root, angle], 1) / std[:_STEP]
