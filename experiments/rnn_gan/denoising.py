@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             seen = [cases(some, kind, noise, split)
                     for some, split in ((tuning, "val"), (judged, chosen.split))]  # fmt: skip
             methods = kept(theirs / f"{kind}, {noise}.pt", by_rivals, model, *seen)
-            own = kept(ours / f"{kind}, {noise}.pt", by_ours, model, *seen)
+            own = kept(ours / f"{kind}, {noise}.pt", by_ours, model, seen[1])
             kinds[kind][noise] = compared(methods | {OURS: own["row"]}, judged)
             print(f"{kind}, {noise}: {_told(kinds[kind][noise])}", flush=True)
     gaits = [m for kind in KINDS[:2] for m in pieces(data, kind, chosen.split, chosen.clips)]
@@ -109,18 +109,15 @@ def by_rivals(model: nn.Module, tuning: list[Case], judged: list[Case]) -> dict[
     return methods
 
 
-def by_ours(model: nn.Module, tuning: list[Case], judged: list[Case]) -> dict:
-    """Ours, with noise told or estimated, as is better on `tuning`; and as tensors, to be looked at."""
-    error = {
-        name: sum(measure(*each)[ERROR] for each in zip(cleaned(model, tuning, name)[0], tuning, strict=True))
-        for name in ("told", "estimated")
-    }  # fmt: skip
-    best = min(error, key=error.get)
+def by_ours(model: nn.Module, judged: list[Case]) -> dict:
+    """Ours, told what is missing and nothing else; and as tensors, to be looked at."""
     begin = time.process_time()
-    found, stepped = cleaned(model, judged, best)
-    row = row_of(found, judged, time.process_time() - begin)
-    row |= {"chosen": f"noise {best}", "stepped back": stepped}
-    return {"row": row, "motions": [(m.root_positions, m.rotations) for m in found]}
+    found = solvers.denoise([c.seen for c in judged], model, missing=[c.missing for c in judged])
+    seconds = time.process_time() - begin
+    row = row_of([its.motion for its in found], judged, seconds)
+    row |= {"ways": [its.record["way"] for its in found],
+            "noise": [its.record["noise"] for its in found]}  # fmt: skip
+    return {"row": row, "motions": [(m.motion.root_positions, m.motion.rotations) for m in found]}
 
 
 def compared(methods: dict[str, dict], judged: list[Case]) -> dict:
@@ -136,14 +133,6 @@ def compared(methods: dict[str, dict], judged: list[Case]) -> dict:
     if HIT in methods[OURS]["each"]:
         found["error where it was hit, over the best filter's"] = against(HIT)
     return record.rounded(found)
-
-
-def cleaned(model: nn.Module, of: list[Case], noise: str) -> tuple[list[Motion], int]:
-    """By `solvers.denoise`, and how often it stepped back; noise: "told" or "estimated"."""
-    masks = [case.missing for case in of]
-    level = of[0].level if noise == "told" else None
-    found = solvers.denoise([case.seen for case in of], model, noise=level, missing=masks)
-    return [its.motion for its in found], sum(bool(its.record.get("stepped back")) for its in found)
 
 
 def row_of(found: list[Motion], judged: list[Case], seconds: float) -> dict:
