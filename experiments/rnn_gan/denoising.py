@@ -23,7 +23,9 @@ from torch import nn
 import motionlab
 from motionlab import Motion, corrupt, filters, metrics, solvers
 from motionlab.errors import DataError
-from motionlab.solvers.denoise_windows import Settings
+from motionlab.solvers.denoise import clean_jobs, see
+from motionlab.solvers.denoise_seen import motion_of, smooth
+from motionlab.solvers.denoise_windows import Job, Settings
 from motionlab.training import Prepared
 from motionlab.weights import find
 
@@ -35,7 +37,7 @@ from .rivals import families, tuned
 NAME = "lstm-gmm-contacts"
 TUNED_ON = 3  # validation clips of a kind
 ERROR, HIT = "joint error (cm)", "error where it was hit (cm)"
-OURS, SEEN, FILLED = "ours", "as seen", "filled"
+OURS, ALWAYS, SEEN, FILLED = "ours", "the network always", "as seen", "filled"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -48,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--output", default="results/denoising.json")
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
-    model = motionlab.load(NAME)
+    model = motionlab.load(NAME).requires_grad_(False)
     data = Prepared.find(chosen.data).matching(model.encoding)
     of = f"{model.hash[:8]}-{data.hash[:8]}-{chosen.split}-{chosen.clips}"
     base = hashed(Path(noises.__file__), Path(rivals.__file__), Path(filters.__file__),
@@ -68,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                     for some, split in ((tuning, "val"), (judged, chosen.split))]  # fmt: skip
             methods = kept(theirs / f"{kind}, {noise}.pt", by_rivals, model, *seen)
             own = kept(ours / f"{kind}, {noise}.pt", by_ours, model, seen[1])
-            kinds[kind][noise] = compared(methods | {OURS: own["row"]}, judged)
+            kinds[kind][noise] = compared(methods | own["rows"])
             print(f"{kind}, {noise}: {_told(kinds[kind][noise])}", flush=True)
     gaits = [m for kind in KINDS[:2] for m in pieces(data, kind, chosen.split, chosen.clips)]
     result = {
@@ -109,27 +111,41 @@ def by_rivals(model: nn.Module, tuning: list[Case], judged: list[Case]) -> dict[
     return methods
 
 
+@torch.no_grad()
 def by_ours(model: nn.Module, judged: list[Case]) -> dict:
-    """Ours, told what is missing and nothing else; and as tensors, to be looked at."""
-    begin = time.process_time()
-    found = solvers.denoise([c.seen for c in judged], model, missing=[c.missing for c in judged])
+    """As `solvers.denoise`, told what is missing and nothing else; and what it would say if it never
+    stepped back. Each with its motions, to be looked at."""
+    encoding, begin = model.encoding, time.process_time()
+    jobs = []
+    for case in judged:
+        seen, levels = see(encoding, case.seen, None, case.missing)
+        jobs.append(Job(seen, levels, smooth(seen, levels, encoding.fps)))
+    done = clean_jobs(model, jobs, Settings())
     seconds = time.process_time() - begin
-    row = row_of([its.motion for its in found], judged, seconds)
-    row |= {"ways": [its.record["way"] for its in found],
-            "noise": [its.record["noise"] for its in found]}  # fmt: skip
-    return {"row": row, "motions": [(m.motion.root_positions, m.motion.rotations) for m in found]}
+    found = {OURS: [its.rows for its in done],
+             ALWAYS: [(its.cleaned or its).rows for its in done]}  # fmt: skip
+    made = {name: [motion_of(encoding, rows) for rows in its] for name, its in found.items()}
+    rows = {name: row_of(motions, judged, seconds) for name, motions in made.items()}
+    rows[OURS] |= {
+        "ways": [its.way for its in done], "noise": [job.noise._asdict() for job in jobs]
+    }  # fmt: skip
+    return {
+        "rows": rows,
+        "motions": {k: [(m.root_positions, m.rotations) for m in its] for k, its in made.items()},
+    }
 
 
-def compared(methods: dict[str, dict], judged: list[Case]) -> dict:
+def compared(methods: dict[str, dict]) -> dict:
     """All methods on one noise, and ours beside the filter that errs least on the clips judged."""
     best = min(rivals.FILTERS, key=lambda name: sum(methods[name]["each"][ERROR]))
-    against = lambda what: ratio(methods[OURS], methods[best], what)
+    against = lambda what, who=OURS: ratio(methods[who], methods[best], what)
     means = {
         name: {"means": {k: metrics.bootstrap(its) for k, its in row["each"].items()}} | row
         for name, row in methods.items()
     }
-    found = {"clips": len(judged), "methods": means, "best filter": best,
-             "error over the best filter's": against(ERROR)}  # fmt: skip
+    found = {"clips": len(methods[OURS]["ways"]), "methods": means, "best filter": best,
+             "error over the best filter's": against(ERROR),
+             "the network's error over the best filter's": against(ERROR, ALWAYS)}  # fmt: skip
     if HIT in methods[OURS]["each"]:
         found["error where it was hit, over the best filter's"] = against(HIT)
     return record.rounded(found)

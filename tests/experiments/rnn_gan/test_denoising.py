@@ -6,9 +6,10 @@ from dataclasses import replace
 import pytest
 import torch
 
+import motionlab
 from experiments.claims import verdicts
 from experiments.rnn_gan import denoising, noises, rivals
-from motionlab import filters
+from motionlab import filters, solvers
 from motionlab.datasets import gaits as people
 from motionlab.datasets import registry
 from motionlab.training import prepare
@@ -71,6 +72,18 @@ def test_tuning_takes_root_and_rotations_apart(truths):
     assert not torch.equal(found.root_positions, wanted.root_positions)
 
 
+def test_ours_is_what_denoise_says(truths):
+    model = motionlab.load("lstm-gmm-contacts").requires_grad_(False)
+    cases = noises.cases(truths, "walking", "gap", "val")
+    found = denoising.by_ours(model, cases)
+    for case, (root, turns), way in zip(cases, found["motions"]["ours"],
+                                        found["rows"]["ours"]["ways"], strict=True):  # fmt: skip
+        its = solvers.denoise(case.seen, model, missing=case.missing)
+        torch.testing.assert_close(root, its.motion.root_positions, rtol=0, atol=1e-3)
+        torch.testing.assert_close(turns, its.motion.rotations, rtol=0, atol=1e-2)
+        assert way == its.record["way"]
+
+
 def test_a_hop_is_seen_at_the_first_frame(truths):
     truth = truths[0]
     places = truth.root_positions.clone()
@@ -104,7 +117,8 @@ def test_a_run_is_written_and_gone_on_with(small, tmp_path, monkeypatch):
     found = json.loads((tmp_path / "r.json").read_text())
     cell = found["kinds"]["walking"]["white, mid"]
     means = {name: its["means"]["joint error (cm)"]["value"] for name, its in cell["methods"].items()}  # fmt: skip
-    assert set(means) == {"as seen", "filled", "gaussian", "projection", "ours"}
+    assert set(means) == {"as seen", "filled", "gaussian", "projection", "ours",
+                          "the network always"}  # fmt: skip
     assert means["ours"] < means["as seen"] and cell["best filter"] == "gaussian"
     ratio = cell["error over the best filter's"]["value"]
     assert ratio == pytest.approx(means["ours"] / means["gaussian"], rel=1e-3)
