@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                   Path(corrupt.__file__))  # fmt: skip
     theirs = chosen.runs / f"rivals-{of}-{base}"
     code = sorted(Path(solvers.__file__).parent.glob("*.py"))
-    ours = chosen.runs / f"ours-{of}-{hashed(Path(noises.__file__), *code)}"
+    ours = chosen.runs / f"ours-{of}-{hashed(Path(__file__), Path(noises.__file__), *code)}"
     kinds = {}
     for kind in KINDS:
         tuning = pieces(data, kind, "val", TUNED_ON)
