@@ -121,9 +121,18 @@ def test_the_commands_for_your_own_clips_run(tmp_path, monkeypatch, capsys):
     write_bvh(replace(walk[:1], skeleton=larger), "rig.bvh")
     for command in commands:
         assert main(command.split()) == 0, command
-    assert len(commands) == 8 and "Traceback" not in capsys.readouterr().err
+    assert len(commands) == 9 and "Traceback" not in capsys.readouterr().err
     assert read_bvh("on_rig.bvh").skeleton.matches(larger, 1e-3)
-    made = {"my.html", "for_blender.glb", "my.glb", "on_rig.bvh", "clean.bvh", "dream.glb"}
+    made = {
+        "my.html",
+        "for_blender.glb",
+        "my.glb",
+        "on_rig.bvh",
+        "clean.bvh",
+        "calm.bvh",
+        "calm.html",
+        "dream.glb",
+    }
     assert made <= {path.name for path in tmp_path.iterdir()}
     assert {path.name for path in (tmp_path / "for_the_engine").iterdir()} == {"a.glb", "b.glb"}
 

@@ -1,4 +1,4 @@
-"""A clip with noise on it comes back nearer to what it was."""
+"""Noise taken away: nearer to the truth, where the network knows the motion; and what is refused."""
 
 from dataclasses import replace
 
@@ -8,8 +8,15 @@ import torch
 
 import motionlab
 from motionlab import datasets
+from motionlab.errors import MotionError, RetargetError, SolverError
 from motionlab.motion import Motion
-from motionlab.solvers import NoiseLevels, denoise
+from motionlab.skeleton import Skeleton
+from motionlab.solvers import NoiseLevels, clean_recording, denoise
+from motionlab.solvers.denoise_seen import Seen, levels_of, motion_of, rows_of, whittaker
+from motionlab.solvers.denoise_windows import Settings, _share, _windows
+
+LEVELS = NoiseLevels(0.02, 0.08)
+FEW = Settings(steps=3, rounds=1)
 
 
 def noisy(motion: Motion, levels: NoiseLevels, seed: int = 0) -> Motion:
@@ -32,7 +39,7 @@ def error(motion: Motion, truth: Motion) -> float:
 
 @pytest.fixture(scope="module")
 def clips():
-    return [clip[:100] for clip in datasets.load("gaits", "val")[:2]]
+    return [clip[:90] for clip in datasets.load("gaits", "val")[:2]]
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +48,163 @@ def model():
 
 
 def test_a_noisy_clip_comes_back_nearer_to_what_it_was(clips, model):
-    levels = NoiseLevels(0.02, 0.08)
-    seen = [noisy(clip, levels, i) for i, clip in enumerate(clips)]
-    for found, truth, was in zip(denoise(seen, model), clips, seen, strict=True):
-        assert len(found.motion) == len(truth)
-        assert error(found.motion, truth) < 0.6 * error(was, truth)
-        said = found.record["noise"]
+    """Side by side, with the noise that was put there found, and as if it were alone."""
+    seen = [noisy(clip, LEVELS, i) for i, clip in enumerate(clips)]
+    found = denoise(seen, model)
+    for its, truth, was in zip(found, clips, seen, strict=True):
+        assert len(its.motion) == len(truth)
+        assert error(its.motion, truth) < 0.5 * error(was, truth)
+        said = its.record["noise"]
         assert said["estimated"]
-        assert said["root_m"] == pytest.approx(levels.root_m, rel=0.2)
-        assert said["angle_rad"] == pytest.approx(levels.angle_rad, rel=0.2)
+        assert said["root_m"] == pytest.approx(LEVELS.root_m, rel=0.2)
+        assert said["angle_rad"] == pytest.approx(LEVELS.angle_rad, rel=0.2)
+    model.leave.bias.requires_grad_(True)
+    alone = denoise(seen[1], model)
+    assert error(alone.motion, found[1].motion) < 0.01
+    assert model.leave.bias.requires_grad  # as it was
+    model.requires_grad_(False)
+
+
+def test_a_clean_clip_comes_back_as_it_is(clips, model):
+    found = denoise(clips[0], model)
+    assert found.motion is clips[0]
+    assert found.record["way"] == "unchanged" and found.record["changed (cm)"] == 0
+
+
+def test_frames_that_jump_are_not_believed(clips, model):
+    seen = noisy(clips[0], LEVELS)
+    rotations = seen.rotations.clone()
+    turns = 0.8 * torch.randn(2, 21, 3, generator=torch.Generator().manual_seed(3))
+    rotations[[30, 61]] = rotations[[30, 61]] @ roma.rotvec_to_rotmat(turns)
+    found = denoise(replace(seen, rotations=rotations), model, noise=LEVELS, settings=FEW)
+    assert found.record["outliers"] == [30, 61]
+    assert not found.record["noise"]["estimated"]
+
+
+def test_what_is_missing_is_not_looked_at(clips, model):
+    """Neither the whole stretch nor the knee: whatever stands there, the same comes out."""
+    seen = noisy(clips[0], LEVELS)
+    knee = seen.skeleton.role("left_lower_leg")
+    missing = torch.zeros(90, 21, dtype=torch.bool)
+    missing[40:50] = True
+    missing[60:, knee] = True
+    root, rotations = seen.root_positions.clone(), seen.rotations.clone()
+    root[40:50], rotations[40:50] = 7.0, torch.eye(3)
+    rotations[60:, knee] = torch.eye(3)
+    other = replace(seen, root_positions=root, rotations=rotations)
+    one, two = (denoise(each, model, missing=missing, settings=FEW) for each in (seen, other))
+    assert error(one.motion, two.motion) < 0.01
+    assert one.record["missing"] == pytest.approx((10 * 21 + 30) / (90 * 21))
+    assert error(one.motion[40:50], clips[0][40:50]) < 15
+
+
+def test_the_first_memory_may_be_sought(clips, model):
+    """With it the energy is no higher than without."""
+    seen = noisy(clips[0][:40], LEVELS)
+    total = lambda how: sum(
+        denoise(seen, model, noise=LEVELS, settings=how).record["energy"].values()
+    )
+    how = Settings(steps=25, rounds=1)
+    assert total(replace(how, first_state=True)) < total(how) + 0.1
+
+
+def test_noise_is_measured(clips, model):
+    encoding = model.encoding
+    for levels in (NoiseLevels(0.01, 0.04), NoiseLevels(0.04, 0.16)):
+        rows = rows_of(encoding, noisy(clips[0], levels))
+        found = levels_of(Seen(rows, torch.ones_like(rows).bool(), torch.zeros(90).bool()))
+        assert found == pytest.approx(levels, rel=0.2)
+
+
+def test_rows_are_the_motion(clips, model):
+    rows = rows_of(model.encoding, clips[0])
+    assert error(motion_of(model.encoding, rows), clips[0]) < 0.01
+
+
+def test_the_smooth_line_is_straight_where_nothing_is_seen():
+    """Through points of a straight line it is that line, gap or not; and its equations hold."""
+    line = torch.arange(20.0)[:, None].double() * torch.tensor([0.1, -3.0])
+    weights = torch.ones(20, 2).double()
+    weights[5:9] = 0
+    hidden = torch.where(weights > 0, line, 99.0)
+    assert torch.allclose(whittaker(hidden, weights, torch.tensor([5.0, 80.0])), line, atol=1e-6)
+    chance = torch.Generator().manual_seed(0)
+    rows = torch.randn(20, 1, generator=chance).double()
+    second = torch.eye(20).double().diff(n=2, dim=0)
+    wanted = torch.linalg.solve(torch.eye(20).double() + 7 * second.T @ second, rows)
+    assert torch.allclose(
+        whittaker(rows, torch.ones_like(rows), torch.tensor([7.0])), wanted, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("frames", [8, 63, 64, 65, 80, 81, 200, 1000])
+def test_windows_share_every_frame_out(frames):
+    how = Settings()
+    total = torch.zeros(frames).double()
+    for window in _windows(0, frames, how):
+        total[window.first : window.first + window.real] += _share(window, frames, how)
+    assert torch.allclose(total, torch.ones(frames).double())
+
+
+def test_another_rig_keeps_what_is_its_own(clips, model):
+    """Longer bones, a finger, twice the frames: nearer to the truth, and the finger as it was."""
+    body = clips[0].skeleton
+    hand = body.role("left_hand")
+    rig = Skeleton(
+        (*body.names, "LeftIndex"), (*body.parents, hand),
+        torch.cat([1.1 * body.offsets, torch.tensor([[0.08, 0.0, 0.0]])]),
+    )  # fmt: skip
+    turns = torch.eye(3).repeat(90, 1, 1, 1)
+    truth = replace(
+        clips[0], skeleton=rig, root_positions=1.1 * clips[0].root_positions,
+        rotations=torch.cat([clips[0].rotations, turns], 1), contacts=None,
+    ).resample(60)  # fmt: skip
+    seen = noisy(truth, LEVELS)
+    found = clean_recording(seen, model, settings=replace(FEW, steps=8))
+    assert found.motion.fps == 60 and len(found.motion) == len(truth)
+    assert found.motion.skeleton is rig
+    assert torch.equal(found.motion.rotations[:, 21], seen.rotations[:, 21])
+    assert error(found.motion, truth) < 0.6 * error(seen, truth)
+
+
+def test_what_makes_no_sense_is_refused(clips, model):
+    clip = clips[0]
+    for given, words in (
+        ((clip[:3],), "too few frames"),
+        ((clip.resample(20),), "30 frames a second"),
+        ((replace(clip, root_positions=1000 * clip.root_positions),), "in metres"),
+        (("walk",), "takes a Motion"),
+    ):
+        with pytest.raises(SolverError, match=words):
+            denoise(list(given), model)
+    for options, words in (
+        ({"missing": torch.ones(90, 21, dtype=torch.bool)}, "all joints are missing"),
+        ({"missing": torch.zeros(90, 20, dtype=torch.bool)}, "of shape"),
+        ({"missing": torch.full((90,), torch.nan)}, "must be bool"),
+        ({"noise": (0.02, -1)}, "two numbers above 0"),
+        ({"noise": 0.1}, "two numbers above 0"),
+        ({"start": clip[:20]}, "same body, rate and length"),
+        ({"settings": Settings(window=20, overlap=16)}, "share half"),
+        ({"settings": Settings(method="magic")}, "method is 'magic'"),
+        ({"model": motionlab.load("aclstm-walking")}, "no likelihood"),
+    ):
+        with pytest.raises(SolverError, match=words):
+            denoise(clip, **{"model": model, **options})
+    with pytest.raises(SolverError, match="a list of 2"):
+        denoise(clips, model, missing=[None])
+
+
+def test_recordings_that_cannot_be_cleaned_are_refused(clips, model):
+    clip = clips[0]
+    huge = replace(clip.skeleton, offsets=1000 * clip.skeleton.offsets)
+    with pytest.raises(SolverError, match="units='mm'"):
+        clean_recording(replace(clip, skeleton=huge), model)
+    with pytest.raises(SolverError, match="frames or more"):
+        clean_recording(clip[:3], model)
+    arm = Skeleton(
+        ("Hips", "Spine", "Head"), (-1, 0, 1), torch.tensor([[0, 0, 0], [0, 0.5, 0], [0, 0.4, 0]])
+    )
+    with pytest.raises(RetargetError, match="no joint for"):
+        clean_recording(Motion(arm, clip.root_positions, clip.rotations[:, :3], 30), model)
+    with pytest.raises(MotionError, match="NaN"):
+        replace(clip, root_positions=clip.root_positions * torch.nan)

@@ -1,36 +1,118 @@
-"""`motionlab clean`: feet that stand still where they rest."""
+"""`motionlab clean`: noise taken away, and feet that stand still where they rest."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
+from tyro.conf import arg
+
+from ..errors import MotionLabError
 from ..motion import Motion
+from .choices import shown_first
+from .clips import files_of
 from .convert import Written
 
+AUTO = "auto"
 
+
+@shown_first("path", "out", "denoise", "feet", "report", "to", "fps", "root_motion")
 @dataclass(kw_only=True)
 class Clean(Written):
-    """Label which foot is down when, and hold feet still on the floor while they are."""
+    """Take noise away, or hold feet still on the floor while they are down, or both."""
+
+    denoise: Annotated[str | None, arg(metavar="auto|CM,DEGREES")] = None
+    """Take away what cameras got wrong: auto finds out how much that is; or say it, as 2,5: the root's
+    place is off by 2 cm and angles by 5 degrees."""
+    feet: bool = False
+    """Hold feet still where they rest; that is also what is done without --denoise."""
+    report: Path | None = None
+    """A page that plays before and after and shows what was changed where; of one file."""
+
+    def run(self) -> None:
+        self._levels = None if self.denoise in (None, AUTO) else _levels(self.denoise)
+        if self.report is not None:
+            if self.path.is_dir() and len(files_of(self.path)) > 1:
+                raise MotionLabError(
+                    f"--report {self.report}: {self.path} is a folder; a report is of one file."
+                )
+            if self.report.suffix.lower() != ".html":
+                raise MotionLabError(f"--report {self.report}: the name must end in .html.")
+            if self.report.exists() and not self.force:
+                raise MotionLabError(
+                    f"--report {self.report}: is there already; --force overwrites it."
+                )
+        super().run()
 
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
-        from ..contacts import foot_points, label
-        from ..feet.lock import lock_feet
-        from ..metrics import foot_skate
+        before, said = motion, []
+        if self.denoise is not None:
+            motion, said = self._denoised(motion)
+        if self.feet or self.denoise is None:
+            motion, more = _held(motion)
+            said += more
+        if self.report is not None:
+            from .clean_report import write_report
 
-        motion = replace(motion, contacts=label(motion, "speed-height"))
-        cleaned = lock_feet(motion, floor=None)
-        moved = 100 * (cleaned.positions() - motion.positions()).norm(dim=-1).amax(0)
-        feet = foot_points(motion.skeleton)
-        toes = motion.contacts[:, [1, 3]]
-        if not toes.any():
-            return motion, ["no toe rests, so that nothing was changed"]
-        was, is_ = (
-            foot_skate(each.positions(), toes, each.skeleton, each.fps)
-            for each in (motion, cleaned)
-        )
-        slid = "" if was.isnan() else f", sliding {was:.1f} cm/s and now {is_:.1f}"
-        return cleaned, [
-            f"toes down {toes.float().mean():.0%} of the time{slid}; feet moved by up to "
-            f"{moved[feet].max():.1f} cm, any joint by {moved.max():.1f}"
+            write_report(before, motion, said, self.report)
+            said.append(f"before and after in {self.report}")
+        return motion, said
+
+    def _denoised(self, motion: Motion) -> tuple[Motion, list[str]]:
+        from ..solvers import clean_recording
+
+        found, record = clean_recording(motion, noise=self._levels, progress=True)
+        noise = record["noise"]
+        told = "estimated" if noise["estimated"] else "as said"
+        said = [
+            f"noise {100 * noise['root_m']:.1f} cm of the root and "
+            f"{math.degrees(noise['angle_rad']):.1f}° of angles ({told})"
         ]
+        if record["way"] == "unchanged":
+            return motion, [*said, "so little that nothing was changed"]
+        if record["outliers"]:
+            frames = record["outliers"]
+            some = ", ".join(map(str, frames[:5])) + (", ..." if len(frames) > 5 else "")
+            said.append(f"{len(frames)} frames not believed ({some})")
+        if record["way"] == "filter":
+            said.append("the network does not know such motion, so it was only smoothed")
+        return found, [*said, f"joints moved by up to {record['changed (cm)']:.1f} cm"]
+
+
+def _levels(text: str) -> tuple[float, float]:
+    """Metres and radians of --denoise CM,DEGREES; raises MotionLabError for what is none."""
+    try:
+        root, angle = map(float, text.split(","))
+    except ValueError:
+        root = angle = math.nan
+    if not (0 < root < math.inf and 0 < angle < math.inf):
+        raise MotionLabError(
+            f"--denoise {text}: must be auto, or two numbers above 0 as 2,5: centimetres of the root "
+            "and degrees of angles."
+        )
+    return root / 100, math.radians(angle)
+
+
+def _held(motion: Motion) -> tuple[Motion, list[str]]:
+    """Feet held still where they rest."""
+    from ..contacts import foot_points, label
+    from ..feet.lock import lock_feet
+    from ..metrics import foot_skate
+
+    motion = replace(motion, contacts=label(motion, "speed-height"))
+    cleaned = lock_feet(motion, floor=None)
+    moved = 100 * (cleaned.positions() - motion.positions()).norm(dim=-1).amax(0)
+    feet = foot_points(motion.skeleton)
+    toes = motion.contacts[:, [1, 3]]
+    if not toes.any():
+        return motion, ["no toe rests, so that nothing was changed"]
+    was, is_ = (
+        foot_skate(each.positions(), toes, each.skeleton, each.fps) for each in (motion, cleaned)
+    )
+    slid = "" if was.isnan() else f", sliding {was:.1f} cm/s and now {is_:.1f}"
+    return cleaned, [
+        f"toes down {toes.float().mean():.0%} of the time{slid}; feet moved by up to "
+        f"{moved[feet].max():.1f} cm, any joint by {moved.max():.1f}"
+    ]

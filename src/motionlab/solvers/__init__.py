@@ -2,6 +2,7 @@
 
 from ..feet.lock import lock_feet
 from .denoise import Denoised, NoiseLevels, denoise
+from .denoise_rig import clean_recording
 from .initial_state import initial_state
 
-__all__ = ["Denoised", "NoiseLevels", "denoise", "initial_state", "lock_feet"]
+__all__ = ["Denoised", "NoiseLevels", "clean_recording", "denoise", "initial_state", "lock_feet"]

@@ -123,18 +123,24 @@ def denoise(
     for clip in clips:
         check_clip(model.encoding, clip)
     begin = time.process_time()
-    seen = [see(model.encoding, clip, noise, mask) for clip, mask in zip(clips, masks, strict=True)]
+    looked = [
+        see(model.encoding, clip, noise, mask) for clip, mask in zip(clips, masks, strict=True)
+    ]
     jobs = [
         Job(its, levels, _begin(model.encoding, clip, its, levels, first))
-        for clip, (its, levels), first in zip(clips, seen, starts, strict=True)
+        for clip, (its, levels), first in zip(clips, looked, starts, strict=True)
     ]
-    with torch.no_grad(), _weights_alone(model):
-        done = clean_jobs(model, jobs, how, generator, progress)
+    done = clean_jobs(model, jobs, how, generator, progress)
     share = (time.process_time() - begin) / max(1, sum(map(len, clips)))
-    found = [
-        _denoised(model.encoding, clip, job, its, noise is None, share * len(clip))
-        for clip, job, its in zip(clips, jobs, done, strict=True)
-    ]
+    found = []
+    for clip, job, its in zip(clips, jobs, done, strict=True):
+        motion = clip
+        if its.way != "unchanged":
+            motion = motion_of(model.encoding, its.rows, clip)
+            motion = replace(motion, contacts=label(motion))
+        seen = job.seen.mask[:, 5::3]  # one channel of each joint
+        record = record_of(clip, motion, seen, job, its, noise is None, share * len(clip))
+        found.append(Denoised(motion, record))
     return found[0] if alone else found
 
 
@@ -154,10 +160,14 @@ def clean_jobs(
     how: Settings,
     generator: torch.Generator | None = None,
     progress: bool = False,
+    always: bool = False,
 ) -> list[Done]:
-    """The best known answer to each job: those that need nothing are left, the others solved together."""
+    """The best known answer to each job: those that need nothing are left, the others solved together.
+
+    always : none is left.
+    """
     encoding = model.encoding
-    needed = [job for job in jobs if not needs_nothing(job)]
+    needed = [job for job in jobs if always or not needs_nothing(job)]
     lines = {id(job): job.rows for job in needed}
     total = how.rounds * sum(len(job.rows) for job in needed)
     found: list[Cleaned] = []
@@ -165,7 +175,8 @@ def clean_jobs(
         for _ in range(how.rounds if needed else 0):
             for job in needed:
                 job.contacts = resting(encoding, job.rows, SLOW)[:, [1, 3]].double()
-            found = clean(model, needed, how, generator, bar.update)
+            with torch.no_grad(), _weights_alone(model):
+                found = clean(model, needed, how, generator, bar.update)
             for job, its in zip(needed, found, strict=True):
                 job.rows = its.rows
     cleaned = {id(job): its for job, its in zip(needed, found, strict=True)}
@@ -214,28 +225,30 @@ def _begin(
     return rows_of(encoding, start_of(clip, start))
 
 
-def _denoised(
-    encoding: JointAngles, clip: Motion, job: Job, done: Done, estimated: bool, seconds: float
-) -> Denoised:
-    if done.way == "unchanged":
-        motion = clip
-    else:
-        motion = motion_of(encoding, done.rows, clip)
-        motion = replace(motion, contacts=label(motion))
-    far = (motion.positions() - clip.positions()).norm(dim=-1)[:, : encoding.skeleton.joints]
+def record_of(
+    before: Motion,
+    after: Motion,
+    seen: Tensor,
+    job: Job,
+    done: Done,
+    estimated: bool,
+    seconds: float,
+) -> dict:
+    """What `denoise` tells of a clip. seen : (frames, joints), where the clip was looked at."""
+    far = (after.positions() - before.positions()).norm(dim=-1)[:, : seen.shape[1]]
     its = done.cleaned
-    return Denoised(motion, {
+    return {
         "noise": {**job.noise._asdict(), "estimated": estimated},
         "outliers": job.seen.outliers.nonzero()[:, 0].tolist(),
-        "missing": 1 - float(job.seen.mask[:, 5::3].double().mean()),
+        "missing": 1 - float(seen.double().mean()),
         "way": done.way,
         "likelihood": done.likelihood,
         "least": done.least,
-        "changed (cm)": 100 * float(far[job.seen.mask[:, 5::3]].max()),
+        "changed (cm)": 100 * float(far[seen].max()),
         "energy": its.parts if its else {},
         "evaluations": its.evaluations if its else 0,
         "seconds": seconds,
-    })  # fmt: skip
+    }
 
 
 @contextmanager

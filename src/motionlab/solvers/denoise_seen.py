@@ -28,7 +28,9 @@ LEAST_ROOT, LEAST_ANGLE = 0.001, 0.004
 FPS = 30.0  # of what is said a frame
 # Accelerations, m and rad a frame², that a body is free to have; chosen on validation clips.
 PUSH_ROOT, PUSH_ANGLE = 0.0035, 0.016
-OUTLIER = 4.0  # deviations of a frame's usual distance from its neighbours' median
+# A frame is an outlier if it is so many spreads farther than usual from its neighbours' median, and more
+# than so many times the noise, or m and rad where there is less noise: no body jumps like that.
+OUTLIER, FAR, FAR_ROOT, FAR_ANGLE = 6.0, 2.5, 0.015, 0.05
 NEIGHBOURS = 7  # frames whose median a frame is held against
 
 
@@ -118,12 +120,12 @@ def outliers_of(seen: Seen, noise: NoiseLevels) -> Tensor:
     rows = torch.where(seen.mask, seen.rows, torch.nan)
     padded = torch.cat([rows[:1].expand(half, -1), rows, rows[-1:].expand(half, -1)])
     off = rows - padded.unfold(0, NEIGHBOURS, 1).nanmedian(-1).values
-    scale = torch.full((rows.shape[1],), max(noise.angle_rad, LEAST_ANGLE)).double()
-    scale[ROOT] = max(noise.root_m, LEAST_ROOT)
+    scale = torch.full((rows.shape[1],), max(noise.angle_rad, FAR_ANGLE)).double()
+    scale[ROOT] = max(noise.root_m, FAR_ROOT)
     far = (off / scale).square().nanmean(1).sqrt()
     usual = far.nanmedian()
     spread = 1.4826 * (far - usual).abs().nanmedian()
-    return far > usual + OUTLIER * torch.maximum(spread, 0.25 * usual)
+    return (far > usual + OUTLIER * torch.maximum(spread, 0.25 * usual)) & (far > FAR)
 
 
 def smooth(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:

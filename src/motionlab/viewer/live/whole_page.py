@@ -27,21 +27,24 @@ p.note {{ opacity: 1; }}
 <h1>{title}</h1>
 <p>{text}</p>
 {notes}{figure}
+{below}
 <script>{script}</script>
 </body>
 </html>
 """
 
 
-def whole_page(figure: PageFigure, title: str, text: str = "", notes: Sequence[str] = ()) -> str:
+def whole_page(
+    figure: PageFigure, title: str, text: str = "", notes: Sequence[str] = (), below: str = ""
+) -> str:
     """The HTML of a page that holds one figure and the script that brings it to life.
 
-    notes : what whoever looks at it should know, a line each above the figure.
+    notes : what whoever looks at it should know, a line each above the figure. below : HTML below it.
     """
     # "</script>" inside the script would end the element
     script = bundle_path().read_text(encoding="utf-8").replace("</script", "<\\/script")
     lines = "".join(f'<p class="note">note: {html.escape(note)}</p>\n' for note in notes)
     return _PAGE.format(
         title=html.escape(title), text=html.escape(text), notes=lines, figure=figure.html,
-        script=script,
+        below=below, script=script,
     )  # fmt: skip

@@ -1,0 +1,118 @@
+"""The page that `motionlab clean --report` writes: before and after, and what was changed where."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import roma
+import torch
+from torch import Tensor
+
+from ..motion import Motion
+
+WORST = 4  # joints whose curves are drawn
+WIDE, HIGH = 640, 120  # of a picture, in its own units
+MOST = 1200  # points of a line: a screen has no more
+_STYLE = """<style>
+.curve { width: 100%; height: auto; display: block; margin: 0.2rem 0 1rem; }
+.curve line { stroke: currentColor; opacity: 0.35; }
+.curve text { fill: currentColor; font: 11px system-ui, sans-serif; }
+.curve polyline { fill: none; stroke-width: 1.5; }
+.before { stroke: #c26a00; } .after { stroke: #1f77d0; }
+.key { display: inline-block; width: 1.2em; border-top: 3px solid; vertical-align: middle; }
+table { border-collapse: collapse; margin: 0.5rem 0; }
+td, th { padding: 0.1rem 0.8rem 0.1rem 0; text-align: right; } th:first-child, td:first-child { text-align: left; }
+.wide { overflow-x: auto; } h2 { font-size: 1.05rem; margin: 1.2rem 0 0.2rem; }
+</style>
+"""
+
+
+def write_report(before: Motion, after: Motion, said: Sequence[str], path: Path) -> None:
+    """Write the page. before, after : of the same rig and rate; said : in words, what was done."""
+    from ..training.checkpoints import write_whole
+    from ..viewer import show
+    from ..viewer.live.whole_page import whole_page
+
+    figure = show(
+        [before, after], labels=["before", "after"], overlay=True, height=460, page=True,
+        colors=["#c26a00", "#1f77d0"],
+    )  # fmt: skip
+    title = f"{before.name or 'A recording'}, cleaned"
+    page = whole_page(figure, title, "; ".join(said), below=_below(before, after))
+    write_whole(path, lambda stream: stream.write(page.encode()))
+
+
+def _below(before: Motion, after: Motion) -> str:
+    """What stands below the player, as HTML."""
+    joints = before.skeleton.joints
+    far = 100 * (after.positions() - before.positions()).norm(dim=-1)[:, :joints]
+    turned = _angles(before, after)
+    worst = turned.square().mean(0).sqrt().argsort(descending=True)[:WORST].tolist()
+    names = before.skeleton.names
+    parts = [_STYLE, "<h2>How far joints were moved, frame by frame</h2>",
+             "<p>The mean over joints, in centimetres, over seconds.</p>",
+             _picture([("after", far.mean(1))], before.fps, "cm")]  # fmt: skip
+    parts.append(
+        '<h2>The joints that were turned most</h2><p><span class="key before"'
+        ' style="border-color:#c26a00"></span> before, <span class="key after"'
+        ' style="border-color:#1f77d0"></span> after: that part of the rotation vector which was '
+        "changed most, in degrees, over seconds.</p>"
+    )
+    for joint in worst:
+        lines = _most_changed(before.rotations[:, joint], after.rotations[:, joint])
+        parts.append(f"<p>{html.escape(names[joint])}</p>")
+        parts.append(_picture(list(zip(("before", "after"), lines, strict=True)), before.fps, "°"))
+    rows = "".join(
+        f"<tr><td>{html.escape(names[j])}</td><td>{far[:, j].mean():.1f}</td>"
+        f"<td>{far[:, j].max():.1f}</td><td>{float(far[:, j].argmax()) / before.fps:.2f}</td>"
+        f"<td>{turned[:, j].mean():.1f}</td></tr>"
+        for j in far.mean(0).argsort(descending=True).tolist()
+    )
+    parts.append(
+        '<h2>Joint by joint</h2><div class="wide"><table><tr><th>joint</th><th>moved, mean (cm)</th>'
+        "<th>most (cm)</th><th>at (s)</th><th>turned, mean (°)</th></tr>" + rows + "</table></div>"
+    )
+    return "\n".join(parts)
+
+
+def _angles(before: Motion, after: Motion) -> Tensor:
+    """Degrees (frames, joints) by which each joint was turned, relative to its parent."""
+    turns = roma.rotmat_to_rotvec(before.rotations.mT @ after.rotations)
+    return turns.norm(dim=-1).rad2deg()
+
+
+def _most_changed(before: Tensor, after: Tensor) -> tuple[Tensor, Tensor]:
+    """One part (frames,) of both rotation vectors about the mean after, in degrees."""
+    mean = roma.special_procrustes(after.mean(0))
+    vectors = [roma.rotmat_to_rotvec(mean.mT @ turns).rad2deg() for turns in (before, after)]
+    part = int((vectors[0] - vectors[1]).square().mean(0).argmax())
+    return vectors[0][:, part], vectors[1][:, part]
+
+
+def _picture(lines: list[tuple[str, Tensor]], fps: float, unit: str) -> str:
+    """Lines (frames,) by their classes over time, as SVG."""
+    values = torch.cat([line for _, line in lines])
+    low, high = float(values.min()), float(values.max())
+    low, high = (low, high) if high - low > 1e-3 else (low - 1, high + 1)
+    frames = len(lines[0][1])
+    across = lambda t: 40 + (WIDE - 50) * t / max(1, frames - 1)
+    up = lambda value: 8 + (HIGH - 30) * (high - value) / (high - low)
+    step = max(1, math.ceil(frames / MOST))
+    drawn = "".join(
+        f'<polyline class="{name}" points="'
+        + " ".join(f"{across(t):.1f},{up(float(line[t])):.1f}" for t in range(0, frames, step))
+        + '"/>'
+        for name, line in lines
+    )
+    floor = HIGH - 22
+    return (
+        f'<svg class="curve" viewBox="0 0 {WIDE} {HIGH}" role="img">'
+        f'<line x1="40" y1="{floor}" x2="{WIDE - 10}" y2="{floor}"/>'
+        f'<text x="0" y="16">{high:.0f} {unit}</text><text x="0" y="{floor}">{low:.0f} {unit}</text>'
+        f'<text x="40" y="{HIGH - 6}">0 s</text>'
+        f'<text x="{WIDE - 10}" y="{HIGH - 6}" text-anchor="end">{(frames - 1) / fps:.1f} s</text>'
+        f"{drawn}</svg>"
+    )
