@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import aclstm_cases
+import denoising_cases
 import path_cases
 import pytest
 import refiner_cases
@@ -212,6 +213,7 @@ CASES = [
     ("W10", "not", sizes(9, 9, 9)),
     *aclstm_cases.CASES,
     *refiner_cases.CASES,
+    *denoising_cases.CASES,
     *path_cases.CASES,
     *steering_cases.CASES,
     *strnn_cases.CASES,
@@ -326,6 +328,8 @@ def test_reproduce_lists_what_is_missing_in_order(clone, capsys):
         "python -m experiments.rnn_gan.samples --model lstm-gmm --sampling "
         "results/lstm_gmm_memory.json --output results/lstm_gmm_memory_samples.json",
         "python -m experiments.rnn_gan.initial_state --model lstm-gmm",
+        "motionlab prepare everything",
+        "python -m experiments.rnn_gan.denoising",
         "python -m experiments.claims.verdicts W1 W8",
     ]
 

@@ -207,7 +207,7 @@ class Motion:
             root_positions=torch.lerp(
                 self.root_positions[before], self.root_positions[after], part[:, None]
             ),
-            rotations=_slerp(self.rotations[before], self.rotations[after], part[:, None]),
+            rotations=slerp(self.rotations[before], self.rotations[after], part[:, None]),
             fps=fps,
             contacts=None if self.contacts is None else self.contacts[nearest],
         )
@@ -295,7 +295,7 @@ def concatenate(motions: Iterable[Motion]) -> Motion:
     )
 
 
-def _slerp(a: Tensor, b: Tensor, part: Tensor) -> Tensor:
+def slerp(a: Tensor, b: Tensor, part: Tensor) -> Tensor:
     """Rotation matrices a share `part` of the way from a to b, along the shorter arc.
 
     a, b : (..., 3, 3); part : broadcasts with (...), from 0 to 1.

@@ -39,3 +39,13 @@ def test_it_runs_and_the_estimated_state_is_likelier(gaits, tmp_path):
     assert likely["estimated"]["value"] > likely["zero"]["value"]
     assert len(found["hop (m/s²)"]["observed"]) == initial_state.FOLLOWED
     assert found["excess hop at frame 1 (m/s²)"]["observed"]["value"] == 0
+    assert 0 <= found["cases"]["clips"] <= found["clips"]
+
+
+def test_cases_are_chosen_by_one_half_and_judged_by_the_other():
+    warm, zero = torch.ones(4, 2), torch.ones(4, 2)
+    chosen, judged = zero.clone(), zero.clone()
+    chosen[:2, 0], judged[:, 0] = 3.0, torch.tensor([2.0, 4.0, 9.0, 9.0])
+    found = initial_state._cases({"zero": [chosen, judged], "observed": [warm, warm]})
+    assert found["clips"] == 2 and found["hop (m/s²)"]["zero"] == [3.0, 1.0]
+    assert initial_state._cases({"zero": [warm, judged], "observed": [warm, warm]})["clips"] == 0
