@@ -51,6 +51,7 @@ def wishes(network, window, piece):
         "planted": terms.planted(body, encoding.fps),
         "poses": lambda features, *rest: terms.poses(encoding)(5 * features, *rest),
         "places": terms.places(points, [0], seen),
+        "headings": terms.headings(torch.full((2, 6), 0.3).double()),
         "channels": terms.channels(angles, encoding.slices["pose"]),
     }
 

@@ -100,7 +100,7 @@ def denoise(
         * "outliers": frames that were seen and not believed; "missing": share of joints not seen;
         * "way": "map", the likeliest motion; "filter", where the network does not know such motion
           and the smooth line is what comes back; "unchanged", where there was nothing to clean;
-        * "likelihood" of the smooth line, nats a frame, and "least", below which it is not known;
+        * "likelihood" of the likeliest motion, nats a frame, and "least", below which it is not known;
         * "changed (cm)": farthest that a joint was moved, where it was seen;
         * "energy": nats a frame of each term, weighed; "evaluations" of it;
         * "seconds": of the processor, the clip's share.
@@ -186,7 +186,8 @@ def clean_jobs(
             done.append(Done(job.seen.rows, "unchanged", float("nan"), float("nan"), None))
             continue
         line, its = lines[id(job)], cleaned[id(job)]
-        likelihood, least = judge(model, line, resting(encoding, line, SLOW)[:, [1, 3]], job.noise)
+        toes = resting(encoding, its.rows, SLOW)[:, [1, 3]]
+        likelihood, least = judge(model, its.rows, toes, job.noise)
         known = likelihood >= least
         done.append(
             Done(its.rows if known else line, "map" if known else "filter", likelihood, least, its)

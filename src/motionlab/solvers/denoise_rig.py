@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import roma
@@ -20,6 +21,7 @@ from scipy.ndimage import uniform_filter1d
 from torch import Tensor, nn
 
 from ..errors import SolverError
+from ..ik.turns import shortest_turn
 from ..io.bvh_units import ancestors, foot_to_head
 from ..motion import Motion
 from ..retargeting import retarget
@@ -50,6 +52,8 @@ _LIMBS = tuple(
     for side in SIDES
     for parts in (("upper_arm", "lower_arm", "hand"), ("upper_leg", "lower_leg", "foot"))
 )
+
+_BONES = {above: below for limb in _LIMBS for above, below in pairwise(limb)}
 
 
 def clean_recording(
@@ -194,6 +198,7 @@ def brought_back(
     own, body = motion.skeleton, before.skeleton
     world, old, new = motion.orientations(), before.orientations(), after.orientations()
     shared = {own.roles[role]: joint for role, joint in body.roles.items() if role in own.roles}
+    own_role = {joint: role for role, joint in own.roles.items()}
     between = _between_joints(own, shared)
     rate = (FPS / motion.fps) ** 1.5
     stiff = (max(noise.angle_rad, LEAST_ANGLE) / (PUSH_ANGLE * rate)) ** 2
@@ -203,7 +208,13 @@ def brought_back(
         if joint in shared:
             like = shared[joint]
             apart = _smooth_turns(old[:, like].mT @ world[:, joint], ~unseen[:, joint], stiff)
-            local[:, joint] = above.mT @ new[:, like] @ apart
+            found = new[:, like] @ apart
+            if below := _BONES.get(own_role[joint]):
+                # how a limb turns about itself is lost on the other body where it is straight
+                bone = own.below(own_role[joint], below)[:, None]
+                still = above @ _smooth_turns(local[:, joint], ~unseen[:, joint], stiff)
+                found = shortest_turn((still @ bone)[..., 0], (found @ bone)[..., 0]) @ still
+            local[:, joint] = above.mT @ found
         elif joint in between:
             local[:, joint] = _smooth_turns(local[:, joint], ~unseen[:, joint], stiff)
         turned.append(above @ local[:, joint])

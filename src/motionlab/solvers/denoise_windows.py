@@ -109,7 +109,7 @@ def clean(
             numbers = {name: float(value[k]) for name, value in said.items()}
             parts[window.clip].append((window.real, numbers))
             evaluations[window.clip] += times
-        done(sum(window.real for window in some))
+        done(sum(window.real - how.overlap * (window.first > 0) for window in some))
     return [
         Cleaned(total, _a_frame(said), times)
         for total, said, times in zip(sums, parts, evaluations, strict=True)
