@@ -351,7 +351,7 @@ def test_a_training_under_way_is_gone_on_with(clone, capsys):
 
 
 @pytest.mark.parametrize(
-    ("names", "said"), [(("W99",), "no claim 'W99'"), (("W1", "S10"), "S10: is open")]
+    ("names", "said"), [(("W99",), "no claim 'W99'"), (("W1", "W9"), "W9: is open")]
 )
 def test_reproduce_of_what_is_not_there(clone, names, said):
     with pytest.raises(MotionLabError, match=said):

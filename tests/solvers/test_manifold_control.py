@@ -55,7 +55,8 @@ def test_a_signal_is_followed_and_the_weights_are_as_before(model, clips, fit, r
     before, signal = weights(model), torch.tensor([0.0, 0.8, 0.5]).expand(35, 3)
     free = control(model, rows[:2], signal, 35, fit=fit, steps=0).features
     assert torch.allclose(free, model.extrapolate(rows[:2], 35), atol=1e-4)
-    led = control(model, rows[:2], signal, 35, fit=fit, steps=20, rate=rate).features
+    alone = Costs(bones=0.0, contacts=0.0)
+    led = control(model, rows[:2], signal, 35, fit=fit, steps=20, rate=rate, costs=alone).features
     assert led.shape == (2, 35, 73) and same(model, before)
     assert all(its.requires_grad and its.grad is None for its in model.parameters())
     off = lambda made: (velocities(model, made) - signal).square().mean()

@@ -14,7 +14,7 @@ from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import ModelError
 from motionlab.models import AcLstm, Erd, LstmGmm, Refiner
 from motionlab.training.checkpoints import save_weights
-from motionlab.weights.export import KEY, check_has_step, export_onnx
+from motionlab.weights.export import KEY, about, check_has_step, export_onnx
 
 NAME = "lstm-gmm-permissive"
 pytest.importorskip("onnx")
@@ -227,6 +227,8 @@ def test_without_onnx_one_is_told_how_to_have_it(monkeypatch, tmp_path):
 def test_a_network_without_a_step_is_named():
     with pytest.raises(ModelError, match="Erd can't be exported.*LstmGmm, AcLstm, Refiner"):
         check_has_step(strange(Erd))
+    with pytest.raises(ModelError, match="Erd can't be exported"):
+        about(strange(Erd))
     encoding = JointAngles(motionlab.Skeleton.canonical(), rotation="euler")
     with pytest.raises(ModelError, match="'euler' can't be exported"):
         export_onnx(Refiner(encoding, Normalizer(encoding.dim), width=4), "never.onnx")

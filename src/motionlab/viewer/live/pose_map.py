@@ -42,7 +42,7 @@ aria-label="A map of poses: click or drag, or use the arrow keys"></canvas>
   const figure = document.getElementById("{key}");
   const {{ rows, columns, poses, parents, dots, colors }} = {content};
   const [map, body] = figure.querySelectorAll("canvas");
-  const at = {{ x: 0.5, y: 0.5 }};
+  const at = dots.length ? {{ x: dots[0][0], y: dots[0][1] }} : {{ x: 0.5, y: 0.5 }};
   const paint = (canvas) => {{
     const ratio = window.devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth || 300, canvas.clientHeight || 300];

@@ -117,7 +117,10 @@ def about(model: nn.Module) -> dict[str, Any]:
     * `sampling`: the temperatures and the like that suit the weights;
     * `starts`: each with its `name` and its state, for a batch of one without the batch;
     * `licence`, in words, `commercial`, whether that allows commercial use, and `citation`.
+
+    Raises ModelError for a network that can't be exported.
     """
+    check_has_step(model)
     encoding, normalizer, kind = model.encoding, model.normalizer, type(model).__name__
     config = encoding.config()
     facts = getattr(model, "about", {})
