@@ -312,13 +312,16 @@ def free(model: nn.Module, refiner: nn.Module, begun: dict) -> dict:
     return found
 
 
-def survival(model: nn.Module, begun, seeds: int, minutes: float) -> dict:
-    """Random commands for some minutes: who falls, glides, freezes, runs away or comes apart?"""
+def survival(model: nn.Module, begun, seeds: int, minutes: float, seed: int = 0) -> dict:
+    """Random commands for some minutes: who falls, glides, freezes, runs away or comes apart?
+
+    seed : of the samples; the commands have another.
+    """
     begin_from(model, begun)
     count, fps = seeds * BEGINS, model.fps
-    live = LiveControl(model, [i % BEGINS for i in range(count)], count, way=OURS)
+    live = LiveControl(model, [i % BEGINS for i in range(count)], count, way=OURS, seed=seed)
     live.behind.go_on = lambda frames: made.append(frames) or [None] * count  # as it is sampled
-    chance, made = torch.Generator().manual_seed(1), []
+    chance, made = torch.Generator().manual_seed(seed + 1), []
     asked = []
     while live.frames < minutes * 60 * fps:
         new = (torch.rand(count, generator=chance) < 1 / (3 * fps / live.how.window)).nonzero()[
