@@ -20,6 +20,7 @@ GAIN = 3.0  # rad/s that are asked for a radian off the way
 BEND, SIDEWAYS = 3.0, 5.0  # rad/s, and m/s² across the way, at most
 SLOWED, SHARP = 1.5, 1.0  # m/s at most for who is more than so many radians off his way
 HURRY = 0.8  # m/s more than they go, as an average of 0.3 s has it: people gain 3 m/s² or less
+STARTS = 0.5  # m/s; who is slower, and more than SHARP off, turns before he goes
 STILL = 0.15  # m/s; who is asked for less is asked to stand
 ON_THE_SPOT, NEAR = 0.5, 0.35  # radians off beyond which, and on to which, who stands turns
 BRAKE, THERE = 1.0, 0.25  # 1/s, speed a metre before a place; m from it, where one stands
@@ -65,7 +66,7 @@ class Aim:
         """
         going = Rows.of(going)
         speed, way, bend = self._way(going, ahead)
-        off = wrapped(way - going.bearing())
+        off = wrapped(way - going.course())
         begun = np.abs(going.turn) > 0.2
         off = np.where((np.abs(off) > BEHIND) & begun, np.abs(off) * np.sign(going.turn), off)
         still = speed < STILL
@@ -75,6 +76,7 @@ class Aim:
         sharp = (np.abs(off) > SHARP) & ~still
         speed = np.where(sharp, np.minimum(speed, SLOWED), speed)
         speed = np.minimum(speed, np.maximum(going.pace + HURRY, 2 * STILL))
+        speed = np.where(sharp & (going.pace < STARTS), np.minimum(speed, 2 * STILL), speed)
         most = np.minimum(SIDEWAYS / np.maximum(going.pace, 0.1), BEND)
         bend = np.where(np.isnan(bend) | still, GAIN * off, bend)
         return speed, bend.clip(-most, most), off

@@ -33,7 +33,8 @@ DAMPED, PULLED = (
     0.6,
     0.15,
 )  # shares a frame: of a body's moves, taken; of what lacks to a stand, given
-RESTS, GLIDES = 0.5, 0.3  # m/s of a foot at most; seconds without: a run's flight is shorter
+SLIDES, RESTS = 0.5, (0.2, 0.5)  # share of their pace at which a foot rests at most; m/s of that
+GLIDES = 0.3  # seconds without: a run's flight is shorter
 
 
 class Steps(NamedTuple):
@@ -125,7 +126,8 @@ class Gliding:
         slowest : (characters, window), m/s of the part of their feet that moves least.
         after, going : where they are then.
         """
-        rested = (slowest < RESTS).any(1)
+        rests = (SLIDES * going.velocity.norm(dim=1)).clamp(*RESTS)
+        rested = (slowest < rests[:, None]).any(1)
         self.frames = torch.where(rested, 0, self.frames + slowest.shape[1])
         if self.model.starts is None:
             return

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from .guided import SLOW, STANDING, Going
 
+WALKS = 0.9  # m/s; who is slower goes, to a part, where he faces
 Angle = TypeVar("Angle", np.ndarray, Tensor)
 
 
@@ -49,10 +50,16 @@ class Rows:
         parts = (torch.from_numpy(part) for part in (self.place, self.velocity, self.turn))
         return Going(self.fps, *(part[rows] for part in parts))
 
-    def bearing(self) -> np.ndarray:
-        """Which way (rows,) they go, radians; who stands goes where he faces."""
-        going = np.arctan2(self.velocity[:, 0], self.velocity[:, 1])
-        return np.where(self.pace < STANDING, self.place[:, 2], going)
+    def course(self) -> np.ndarray:
+        """Which way (rows,) they go, radians. The slower, the more is it the way they face, and at a stand
+        nothing else: or else who hardly moves takes a step aside for a turn."""
+        yaw = self.place[:, 2]
+        aside = wrapped(np.arctan2(self.velocity[:, 0], self.velocity[:, 1]) - yaw)
+        return yaw + self.walks() * aside
+
+    def walks(self) -> np.ndarray:
+        """How much (rows,) of a walk it is, from 0, a stand, to 1."""
+        return ((self.pace - STANDING) / (WALKS - STANDING)).clip(0, 1)
 
     def move(self, step: np.ndarray) -> None:
         """Go on by a frame's step to the left and ahead, and turn: (rows, 3)."""

@@ -52,9 +52,7 @@ class FeetPoints:
         """
         batch, frames = features.shape[:2]
         points = np.full((batch, frames, self.encoding.points, 3), np.nan, np.float32)
-        rows = (
-            features.numpy().reshape(batch * frames, -1).T
-        )  # (dim, rows): kinematics take rows last
+        rows = features.numpy().reshape(batch * frames, -1).T  # kinematics take the batch last
         vectors = rows.take(self.columns, 0).reshape(-1, 3, batch * frames)
         x, y, z = chain_ends(turns_of(vectors, self.mean), self.levels, self.offsets).swapaxes(0, 1)
         x_at, z_at, yaw = place.reshape(-1, 3).T

@@ -166,8 +166,11 @@ def _push(
     x, z = going.velocity.T
     held = lambda moved: (-HOLD * moved).clip(-AGAINST, AGAINST)
     pace = (SHARE * (speed - going.pace)).clip(-PACE, PACE)
-    left = np.where(still, held(x * cosine - z * sine), 0.0)
-    ahead = np.where(still, held(x * sine + z * cosine), pace)
+    left, ahead = x * cosine - z * sine, x * sine + z * cosine  # as they go
+    aside = (1 - going.walks()) * (SHARE * -left).clip(
+        -PACE, PACE
+    )  # who is slow goes where he faces
+    left, ahead = np.where(still, held(left), aside), np.where(still, held(ahead), pace)
     turn = (SHARE * (bend - going.turn)).clip(-TURN, TURN)
     return left / going.fps, ahead / going.fps, turn / going.fps
 
@@ -176,7 +179,7 @@ def _energy(model: LstmGmm, was: Rows, now: Rows, wanted: tuple, z: Tensor) -> T
     """How far futures (batch,) are from what is asked, in nats."""
     speed, bend, off = wanted
     still = speed < STILL
-    left = off - wrapped(now.bearing() - was.bearing())
+    left = off - wrapped(now.course() - was.course())
     value = ((now.pace - speed) / SPEED) ** 2 / 2 + ((now.turn - bend) / TURNING) ** 2 / 2
     value = value + np.where(still, 0.0, (np.abs(left) / WAY) ** 2 / 2)
     if still.any():
