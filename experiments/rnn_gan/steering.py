@@ -93,11 +93,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--split", choices=("val", "test"), default="test")
     parser.add_argument("--runs", type=Path, default=Path("runs/steering"))
     parser.add_argument("--output", default="results/steering.json")
+    parser.add_argument("--only-speed", action="store_true", help="anew, in a result that is there: "
+                        "after a change that leaves all motion as it is")  # fmt: skip
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
     torch.set_num_threads(1)
     model, refiner = motionlab.load(NAME), motionlab.load(REFINER)
     data = Prepared.find("locomotion").matching(model.encoding)
+    if chosen.only_speed:
+        result = json.loads(Path(chosen.output).read_text())
+        result["speed"] = speed(model, refiner)
+        result["speed measured by"] = record.provenance(begin, 0, data)
+        return record.write(result, chosen.output)
     runs = chosen.runs / f"{made_with(model)}-{chosen.split}-{chosen.seeds}"
     begun = {gait: beginnings(model, data, gait, chosen.split) for gait in ("walk", "run", "stand")}
     rival = pfnn.load_authors()
@@ -305,13 +312,16 @@ def free(model: nn.Module, refiner: nn.Module, begun: dict) -> dict:
     return found
 
 
-def survival(model: nn.Module, begun, seeds: int, minutes: float) -> dict:
-    """Random commands for some minutes: who falls, glides, freezes, runs away or comes apart?"""
+def survival(model: nn.Module, begun, seeds: int, minutes: float, seed: int = 0) -> dict:
+    """Random commands for some minutes: who falls, glides, freezes, runs away or comes apart?
+
+    seed : of the samples; the commands have another.
+    """
     begin_from(model, begun)
     count, fps = seeds * BEGINS, model.fps
-    live = LiveControl(model, [i % BEGINS for i in range(count)], count, way=OURS)
+    live = LiveControl(model, [i % BEGINS for i in range(count)], count, way=OURS, seed=seed)
     live.behind.go_on = lambda frames: made.append(frames) or [None] * count  # as it is sampled
-    chance, made = torch.Generator().manual_seed(1), []
+    chance, made = torch.Generator().manual_seed(seed + 1), []
     asked = []
     while live.frames < minutes * 60 * fps:
         new = (torch.rand(count, generator=chance) < 1 / (3 * fps / live.how.window)).nonzero()[

@@ -16,7 +16,7 @@ from torch import Tensor
 from motionlab import Motion, metrics
 from motionlab.encodings import JointAngles
 from motionlab.feet.contacts import foot_points
-from motionlab.solvers.live_aim import wrapped
+from motionlab.solvers.live_going import wrapped
 
 SETTLED = 0.5  # seconds that must be kept
 WITHIN, FACING, SPEED = 10.0, 15.0, 0.1  # degrees of travel, of facing, and share of the speed

@@ -17,7 +17,8 @@ from motionlab.models.pfnn.layout import GAITS
 from motionlab.models.pfnn.network import Pfnn
 from motionlab.models.pfnn.walk import Frame, begin, lead, step
 from motionlab.paths import upright
-from motionlab.solvers.live_aim import STILL, wrapped
+from motionlab.solvers.live_aim import STILL
+from motionlab.solvers.live_going import wrapped
 
 BLEND = 0.25  # seconds in which the way ahead has come to what is asked, but for a third
 CHANGE = 0.2  # seconds in which gait and speed have

@@ -7,6 +7,7 @@ import torch
 from tiny_lstm import tiny_clips, tiny_lstm
 
 import motionlab
+from motionlab import metrics
 from motionlab.errors import SolverError
 from motionlab.metrics import broken
 from motionlab.motion import concatenate
@@ -15,6 +16,8 @@ from motionlab.solvers.guided import Going
 from motionlab.solvers.live_aim import BEND, HURRY, SIDEWAYS, SLOWED, Aim
 from motionlab.solvers.live_control import LiveControl
 from motionlab.solvers.live_feet import Behind
+from motionlab.solvers.live_frame import slowest_foot
+from motionlab.solvers.live_going import wrapped
 
 
 @pytest.fixture(scope="module")
@@ -231,3 +234,45 @@ def test_the_aim_asks_for_what_bodies_can_do():
 def test_who_stands_turns_on_the_spot_only_when_it_is_worth_it():
     assert aimed(going(speed=0.0), 0.0, 0.3)[1] == 0
     assert aimed(going(speed=0.0), 0.0, 1.0)[1] > 0
+
+
+def test_who_stands_turns_before_he_goes_and_who_is_slow_goes_where_he_faces():
+    assert aimed(going(speed=0.0), 1.2, 3.0)[0] == 0.3  # a step, and not yet a walk
+    assert aimed(going(speed=0.0), 1.2, 0.5)[0] == pytest.approx(HURRY)
+    faces = going(speed=0.3)
+    faces.velocity = torch.tensor([[0.3, 0.0]]).double()  # a step to the left, and faces ahead
+    assert aimed(faces, 0.5, math.pi / 2)[2] == pytest.approx(math.pi / 2)
+    faces.velocity = 4 * faces.velocity  # who walks goes his way, however he faces
+    assert aimed(faces, 1.2, math.pi / 2)[2] == pytest.approx(0)
+
+
+def test_a_half_turn_from_a_stand_and_at_half_a_metre_a_second_is_stepped():
+    """Twelve characters: nobody walks a loop or like a crab, and feet slide less on average than they did (0.43 m/s)."""
+    model = motionlab.load("lstm-gmm-contacts")
+    live = LiveControl(model, ["stand"] * 6 + ["walk"] * 6, 12, futures=8, seed=2)
+    live.steer([0.0] * 6 + [0.5] * 6, 0.0)
+    for _ in range(14):
+        live.go_on()
+    turned = live.frames
+    live.steer([1.2] * 6 + [0.5] * 6, math.pi - 0.02)
+    for _ in range(24):
+        live.go_on()
+    motions = [live.motion(i) for i in range(12)]
+    slid = [
+        slowest_foot(motion.positions(), motion.skeleton, 30)[turned:].mean() for motion in motions
+    ]
+    assert torch.stack(slid).mean() < 0.35
+    for motion in motions:
+        facing = metrics.facing(motion.positions(), model.encoding.skeleton).double()
+        off = wrapped(facing[turned + 75 :] - math.pi)
+        assert off.abs().mean().rad2deg() < 25
+        root = motion.root_positions[turned:, [0, 2]]
+        assert (root[:, 0] - root[0, 0]).abs().max() < 1.1  # who walks a loop is farther aside
+        crab = wrapped(facing[turned + 80 : -5] - way_of(motion)[turned + 75 :])
+        assert crab.abs().mean().rad2deg() < 28
+
+
+def way_of(motion):
+    """The way of ten frames each (frames - 10,)."""
+    moved = motion.root_positions[10:, [0, 2]] - motion.root_positions[:-10, [0, 2]]
+    return torch.atan2(moved[:, 0], moved[:, 1]).double()

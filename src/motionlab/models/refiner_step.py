@@ -137,7 +137,7 @@ class _Step:
     def _moving(self, now: np.ndarray, before: np.ndarray) -> np.ndarray:
         """End effectors (batch, effectors, 6) as `JointAngles.end_effectors` gives them."""
         both = np.concatenate([before, now]).T  # (dim, batch): kinematics take batches last
-        local = _turns(both.take(self.vectors, 0).reshape(-1, 3, both.shape[1]), self.mean_pose)
+        local = turns_of(both.take(self.vectors, 0).reshape(-1, 3, both.shape[1]), self.mean_pose)
         points = chain_ends(local, self.levels, self.offsets)  # (effectors, 3, batch)
         points[:, 1] += both[3]
         count = len(now)
@@ -165,7 +165,7 @@ class _Step:
         return steps
 
 
-def _turns(vectors: np.ndarray, mean: np.ndarray) -> np.ndarray:
+def turns_of(vectors: np.ndarray, mean: np.ndarray) -> np.ndarray:
     """Rotations (joints, 3, 3, batch) of vectors (joints, 3, batch) from a mean (joints, 3, 3).
 
     The root, joint 0, tilts and does not turn: its vector has no y component, whatever it says.

@@ -173,6 +173,13 @@ class Few:
             out, self.cell[i] = _lstm(gates(read), self.cell[i])
             self.hidden[i] = out
 
+    def keep(self, rows: np.ndarray) -> None:
+        """Go on with some characters only; no more is drawn of them."""
+        self.hidden, self.cell = (
+            [part[rows] for part in parts] for parts in (self.hidden, self.cell)
+        )
+        self.noise, self.seen = self.noise[rows], self.seen[rows]
+
     def after(self) -> tuple[Tensor, ...]:
         """h and C (batch, layers, width), noise and seen (batch, kept), as they are now."""
         parts = np.stack(self.hidden, 1), np.stack(self.cell, 1), self.noise, self.seen

@@ -6,28 +6,25 @@ can do: nobody is asked for more than the data's fastest, nor to turn at a run a
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from ..paths import Curves
 from .guided import LEAST_LOOK, LOOK, Going
+from .live_going import Rows, wrapped
 
 GAIN = 3.0  # rad/s that are asked for a radian off the way
 BEND, SIDEWAYS = 3.0, 5.0  # rad/s, and m/s² across the way, at most
 SLOWED, SHARP = 1.5, 1.0  # m/s at most for who is more than so many radians off his way
 HURRY = 0.8  # m/s more than they go, as an average of 0.3 s has it: people gain 3 m/s² or less
+STARTS = 0.5  # m/s; who is slower, and more than SHARP off, turns before he goes
 STILL = 0.15  # m/s; who is asked for less is asked to stand
 ON_THE_SPOT, NEAR = 0.5, 0.35  # radians off beyond which, and on to which, who stands turns
 BRAKE, THERE = 1.0, 0.25  # 1/s, speed a metre before a place; m from it, where one stands
 BEHIND = 2.6  # radians off, beyond which left and right are as good: the side that is begun stays
-
-
-def wrapped(angle: Tensor) -> Tensor:
-    """From -π to π."""
-    return torch.remainder(angle + math.pi, 2 * math.pi) - math.pi
 
 
 @dataclass
@@ -60,48 +57,51 @@ class Aim:
         each = (self.speed, self.direction, self.target, self.which, self.arcs)
         return Aim(*(part[rows] for part in each), self.curves, self.lengths)
 
-    def wanted(self, going: Going, ahead: float = 0.0) -> tuple[Tensor, Tensor, Tensor]:
+    def wanted(
+        self, going: Going | Rows, ahead: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Speed (batch,) m/s, bend (batch,) rad/s, and radians off the way (batch,), as of now.
 
         going : where the characters are; ahead : seconds since the arcs were true.
         """
+        going = Rows.of(going)
         speed, way, bend = self._way(going, ahead)
-        off = wrapped(way - going.bearing())
-        begun = going.turn.abs() > 0.2
-        off = torch.where((off.abs() > BEHIND) & begun, off.abs() * going.turn.sign(), off)
+        off = wrapped(way - going.course())
+        begun = np.abs(going.turn) > 0.2
+        off = np.where((np.abs(off) > BEHIND) & begun, np.abs(off) * np.sign(going.turn), off)
         still = speed < STILL
         facing = wrapped(way - going.place[:, 2])
-        on_the_spot = facing * (
-            facing.abs() > torch.where(going.turn.abs() > 0.5, NEAR, ON_THE_SPOT)
-        )
-        off = torch.where(still, on_the_spot, off)
-        sharp = (off.abs() > SHARP) & ~still
-        speed = torch.where(sharp, speed.clamp(max=SLOWED), speed)
-        pace = going.velocity.norm(dim=1)
-        speed = torch.minimum(speed, (pace + HURRY).clamp(min=2 * STILL))
-        most = (SIDEWAYS / pace.clamp(min=0.1)).clamp(max=BEND)
-        bend = torch.where(bend.isnan() | still, GAIN * off, bend)
-        return speed, bend.clamp(-most, most), off
+        on_the_spot = np.abs(facing) > np.where(np.abs(going.turn) > 0.5, NEAR, ON_THE_SPOT)
+        off = np.where(still, facing * on_the_spot, off)
+        sharp = (np.abs(off) > SHARP) & ~still
+        speed = np.where(sharp, np.minimum(speed, SLOWED), speed)
+        speed = np.minimum(speed, np.maximum(going.pace + HURRY, 2 * STILL))
+        speed = np.where(sharp & (going.pace < STARTS), np.minimum(speed, 2 * STILL), speed)
+        most = np.minimum(SIDEWAYS / np.maximum(going.pace, 0.1), BEND)
+        bend = np.where(np.isnan(bend) | still, GAIN * off, bend)
+        return speed, bend.clip(-most, most), off
 
-    def _way(self, going: Going, ahead: float) -> tuple[Tensor, Tensor, Tensor]:
+    def _way(self, going: Rows, ahead: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Speed, way and, of those on a path, bend (batch,); else NaN."""
-        to = self.target - going.place[:, :2]
-        far = to.norm(dim=1)
-        near = torch.where(far < THERE, 0.0, (BRAKE * far).clamp(min=2 * STILL))
-        aimed = far.isfinite()
-        speed = torch.where(aimed, torch.minimum(self.speed, near), self.speed)
-        way = torch.where(aimed & (far > THERE), torch.atan2(to[:, 0], to[:, 1]), self.direction)
-        bend = torch.full_like(way, torch.nan)
-        led = self.which >= 0
-        if self.curves is not None and led.any():
+        to = self.target.numpy() - going.place[:, :2]
+        far, speed, way = np.hypot(*to.T), self.speed.numpy(), self.direction.numpy()
+        near = np.where(far < THERE, 0.0, np.maximum(BRAKE * far, 2 * STILL))
+        aimed = np.isfinite(far)
+        speed = np.where(aimed, np.minimum(speed, near), speed)
+        way = np.where(aimed & (far > THERE), np.arctan2(*to.T), way)
+        bend = np.full_like(way, np.nan)
+        if self.curves is not None and (self.which >= 0).any():
+            led = self.which >= 0
             which, arcs = self.which.clamp(min=0), self.arcs + ahead * self.speed
-            left = self.lengths[which] - arcs
-            slow = torch.where(left < THERE, 0.0, (BRAKE * left).clamp(min=2 * STILL))
-            speed = torch.where(led, torch.minimum(speed, slow), speed)
-            look = (LOOK * speed).clamp(min=LEAST_LOOK)
-            there = self.curves.at((arcs + look)[:, None], which)[:, 0] - going.place[:, :2]
-            way = torch.where(led, torch.atan2(there[:, 0], there[:, 1]), way)
-            bend = torch.where(led, going.bend(there, speed), bend)
+            left = (self.lengths[which] - arcs).numpy()
+            slow = np.where(left < THERE, 0.0, np.maximum(BRAKE * left, 2 * STILL))
+            led = led.numpy()
+            speed = np.where(led, np.minimum(speed, slow), speed)
+            look = torch.from_numpy((LOOK * speed).clip(min=LEAST_LOOK))
+            now = going.going()
+            there = self.curves.at((arcs + look)[:, None], which)[:, 0] - now.place[:, :2]
+            way = np.where(led, np.arctan2(*there.numpy().T), way)
+            bend = np.where(led, now.bend(there, torch.from_numpy(speed)).numpy(), bend)
         return speed, way, bend
 
     def onward(self, going: Going) -> None:

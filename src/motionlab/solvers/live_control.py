@@ -32,9 +32,10 @@ from ..weights import load
 from .design import checked, fastest_of
 from .energy import Before
 from .guided import Going
-from .live_aim import STILL, Aim, wrapped
+from .live_aim import STILL, Aim
 from .live_feet import Behind
 from .live_frame import Gliding
+from .live_going import wrapped
 from .live_ways import WAYS, How, Window, answer
 from .run_up import begin_with
 from .windows import STRANGE
@@ -205,7 +206,7 @@ class LiveControl:
         begin = time.perf_counter()
         found = answer(self.model, self.before, self.going, self.aim, self.how)
         self._begin_again(found)
-        self.gliding.remind(found.frames, self.before.frame, found.after, found.going)
+        self.gliding.remind(found.slowest, found.after, found.going)
         self.before, self.going = found.after, found.going
         self.aim.onward(self.going)
         self.evaluations += found.evaluations
@@ -225,7 +226,7 @@ class LiveControl:
             return
         rows = lost.nonzero()[:, 0]
         frame, place = self.home.frame[rows], self.going.place[rows]
-        found.frames[rows] = frame[:, None]
+        found.frames[rows], found.slowest[rows] = frame[:, None], 0.0
         known = self.home._replace(seen=self.model.normalizer(self.home.frame))
         for part, own in zip(found.after.state, known, strict=True):
             part[rows] = own[rows] if part.shape == own.shape else 0.0
@@ -261,7 +262,7 @@ class LiveControl:
         pace = float(self.going.velocity[row].norm())
         speed, way, off = float(self.aim.speed[row]), float(self.aim.direction[row]), 0.0
         only = self.aim[torch.tensor([row])]
-        off = math.degrees(float(only.wanted(self.going[torch.tensor([row])])[2]))
+        off = math.degrees(only.wanted(self.going[torch.tensor([row])])[2].item())
         going = math.degrees(float(self.going.bearing()[row]))
         led = int(self.aim.which[row]) >= 0 or bool(self.aim.target[row].isfinite().all())
         since = (self.frames - int(self.asked_at[row])) / self.fps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
@@ -35,6 +36,7 @@ class Behind:
     ) -> None:
         self.encoding, self.refiner = encoding, refiner
         self.state, self.place = None, place.double()
+        self.known = broken.knows(encoding)
         self.before = frame if refiner is None else self._refined(frame[:, None])[:, 0]
         streams = range(len(frame)) if lock else ()
         self.locks = [LockStream(encoding.skeleton, encoding.fps) for _ in streams]
@@ -47,13 +49,14 @@ class Behind:
         encoding = self.encoding
         frames = frames if self.refiner is None else self._refined(frames)
         rows = torch.cat([self.before[:, None], frames], 1)
+        roots, rotations = encoding.rotations(rows, self.place.to(rows))
+        contacts = self._contacts(frames)
         made = [
-            encoding.to_motion(row, place.to(row))[1:]
-            for row, place in zip(rows, self.place, strict=True)
+            Motion(encoding.skeleton, root[1:], turns[1:], encoding.fps, contacts=down)
+            for root, turns, down in zip(roots, rotations, contacts, strict=True)
         ]
-        walked = encoding.root_path(rows, self.place.to(rows))[:, -1]
         yaw = self.place[:, 2] + frames[..., 2].double().sum(1)
-        self.place = torch.stack([walked[:, 0].double(), walked[:, 2].double(), yaw], 1)
+        self.place = torch.stack([roots[:, -1, 0].double(), roots[:, -1, 2].double(), yaw], 1)
         self.before = frames[:, -1]
         return [self._locked(i, motion) for i, motion in enumerate(made)] if self.locks else made
 
@@ -67,7 +70,16 @@ class Behind:
             refined, self.state = self.refiner.refine(frame, self.state)
             found.append(refined)
         features = torch.cat(found, 1)
-        return broken.within(self.encoding, features) if broken.knows(self.encoding) else features
+        return broken.within(self.encoding, features) if self.known else features
+
+    def _contacts(self, frames: Tensor) -> Sequence[Tensor | None]:
+        """Of each character, as a Motion has them: heels, which no row knows of, are False."""
+        toes = self.encoding.contacts(frames)
+        if toes is None:
+            return [None] * len(frames)
+        contacts = torch.zeros(*frames.shape[:2], 4, dtype=torch.bool)
+        contacts[..., [1, 3]] = toes > 0.5
+        return contacts
 
     def _locked(self, i: int, motion: Motion) -> Motion | None:
         self.waiting[i] = torch.cat([self.waiting[i], motion.contacts])

@@ -9,14 +9,19 @@ it was asked to.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
 import torch
 from torch import Tensor
 
 from ..encodings.normalizer import Normalizer
 from ..feet.contacts import foot_points
 from ..models import LstmGmm
+from ..skeleton import Skeleton
 from .energy import Before
 from .guided import Going
+from .live_going import Rows
 from .run_up import pick_start
 
 LIMIT = 4.0  # deviations of the data: few steps and turns lie beyond
@@ -28,39 +33,62 @@ DAMPED, PULLED = (
     0.6,
     0.15,
 )  # shares a frame: of a body's moves, taken; of what lacks to a stand, given
-RESTS, GLIDES = 0.5, 0.3  # m/s of a foot at most; seconds without: a run's flight is shorter
+SLIDES, RESTS = 0.5, (0.2, 0.5)  # share of their pace at which a foot rests at most; m/s of that
+GLIDES = 0.3  # seconds without: a run's flight is shorter
+
+
+class Steps(NamedTuple):
+    """Where a root's step to the left, its step ahead and its turn are in a normalised frame.
+
+    columns : of the three; mean, std : (3,) of them, raw units a frame; body : bool (kept,), the rest.
+    """
+
+    columns: list[int]
+    mean: np.ndarray
+    std: np.ndarray
+    body: np.ndarray
+
+    @classmethod
+    def of(cls, normalizer: Normalizer) -> Steps:
+        kept = normalizer.kept.numpy()
+        columns = [int(np.flatnonzero(kept == channel)[0]) for channel in range(3)]
+        return cls(columns, normalizer.mean[:3].numpy(), normalizer.std[:3].numpy(), kept > 2)
+
+    def raw(self, seen: np.ndarray) -> np.ndarray:
+        """Metres and radians (batch, 3) of frames (batch, kept)."""
+        return seen[:, self.columns] * self.std + self.mean
 
 
 def bounded(
-    seen: Tensor, columns: list[int], normalizer: Normalizer, going: Going, speed: Tensor, bend: Tensor
-) -> Tensor:  # fmt: skip
+    seen: np.ndarray, steps: Steps, going: Rows, speed: np.ndarray, bend: np.ndarray
+) -> np.ndarray:
     """Frames (batch, kept), normalised, as near as a body can do them who is asked for this.
 
-    columns : those of the step to the left, the step ahead and the turn.
     going : before the frame; speed : (batch,) m/s and bend : (batch,) rad/s that are asked for.
     """
-    mean, std, fps = normalizer.mean[:3], normalizer.std[:3], going.fps
-    seen = seen.clamp(-LIMIT, LIMIT)
-    left, ahead, turn = (seen[:, columns] * std + mean).mul(fps).unbind(1)  # a second
-    pace = going.velocity.norm(dim=1)
-    most = (torch.maximum(speed, pace - BRAKES) + SWAY).to(seen)
-    share = (most / torch.hypot(left, ahead).clamp(min=1e-9)).clamp(max=1)
-    most_turn = (torch.maximum(bend.abs(), going.turn.abs() - SLOWER) + SWING).to(seen)
-    root = (share * left).clamp(-ASIDE, ASIDE), (share * ahead).clamp(min=-BACK)
-    root = torch.stack([*root, turn.clamp(-most_turn, most_turn)], 1)
-    seen[:, columns] = (root / fps - mean) / std
+    seen = seen.clip(-LIMIT, LIMIT)
+    left, ahead, turn = (steps.raw(seen) * going.fps).T  # a second
+    most = (np.maximum(speed, going.pace - BRAKES) + SWAY).astype(seen.dtype)
+    share = np.minimum(most / np.maximum(np.hypot(left, ahead), 1e-9), 1)
+    most_turn = np.maximum(np.abs(bend), np.abs(going.turn) - SLOWER) + SWING
+    most_turn = most_turn.astype(seen.dtype)
+    root = (share * left).clip(-ASIDE, ASIDE), np.maximum(share * ahead, -BACK)
+    root = np.stack([*root, turn.clip(-most_turn, most_turn)], 1)
+    seen[:, steps.columns] = (root / going.fps - steps.mean) / steps.std
     return seen
 
 
-def stand_of(model: LstmGmm) -> Tensor | None:
+def stand_of(model: LstmGmm) -> np.ndarray | None:
     """How people stand, normalised (kept,): the model's start of that name; None: it has none."""
     names = getattr(model, "start_names", ())
     if "stand" not in names:
         return None
-    return model.normalizer(model.starts.frame[names.index("stand")])
+    return model.normalizer(model.starts.frame[names.index("stand")]).numpy()
 
 
-def stood(seen: Tensor, last: Tensor, body: Tensor, stand: Tensor | None) -> Tensor:
+def stood(
+    seen: np.ndarray, last: np.ndarray, body: np.ndarray, stand: np.ndarray | None
+) -> np.ndarray:
     """Frames (batch, kept), normalised, of who comes to stand: their bodies move less than was drawn,
     and towards a stand, so that feet which a stop found a stride apart come together.
 
@@ -69,7 +97,14 @@ def stood(seen: Tensor, last: Tensor, body: Tensor, stand: Tensor | None) -> Ten
     moved = (1 - DAMPED) * (seen - last)
     if stand is not None:
         moved = moved + PULLED * (stand - last)
-    return torch.where(body, last + moved, seen)
+    return np.where(body, last + moved, seen)
+
+
+def slowest_foot(positions: Tensor, skeleton: Skeleton, fps: float) -> Tensor:
+    """Speed over the ground (..., frames - 1), m/s, of the part of the feet that moves least, from
+    points (..., frames, points, 3)."""
+    feet = positions[..., foot_points(skeleton), :][..., [0, 2]]
+    return feet.diff(dim=-3).norm(dim=-1).amin(-1) * fps
 
 
 class Gliding:
@@ -81,21 +116,19 @@ class Gliding:
     """
 
     def __init__(self, model: LstmGmm, characters: int) -> None:
-        self.model, self.feet = model, foot_points(model.encoding.skeleton)
+        self.model = model
         self.frames = torch.zeros(characters, dtype=torch.long)  # that each has glided for
         self.reminded = [0] * characters
 
-    def remind(self, frames: Tensor, before: Tensor, after: Before, going: Going) -> None:
+    def remind(self, slowest: Tensor, after: Before, going: Going) -> None:
         """What those remember who glide too long by now, in place.
 
-        frames : (characters, window, dim), raw units, and those before them (characters, dim).
+        slowest : (characters, window), m/s of the part of their feet that moves least.
         after, going : where they are then.
         """
-        rows = torch.cat([before[:, None], frames], 1)
-        feet = self.model.encoding.positions(rows, points=frozenset(self.feet))[:, :, self.feet]
-        moved = feet[..., [0, 2]].diff(dim=1).norm(dim=-1).amin(-1) * going.fps
-        rested = (moved < RESTS).any(1)
-        self.frames = torch.where(rested, 0, self.frames + frames.shape[1])
+        rests = (SLIDES * going.velocity.norm(dim=1)).clamp(*RESTS)
+        rested = (slowest < rests[:, None]).any(1)
+        self.frames = torch.where(rested, 0, self.frames + slowest.shape[1])
         if self.model.starts is None:
             return
         for row in (self.frames >= GLIDES * going.fps).nonzero()[:, 0].tolist():

@@ -1,16 +1,27 @@
 // What is asked of a steered character, and what that means now: motionlab/solvers/live_aim.py. A speed and a way,
 // or a path, become a speed and a bend a frame that a body can do.
-import { clamp, wrapped } from "../network/going.js";
+import { clamp, STANDING, wrapped } from "../network/going.js";
 
 const GAIN = 3; // rad/s that are asked for a radian off the way
 const [BEND, SIDEWAYS] = [3, 5]; // rad/s, and m/s² across the way, at most
 const [SLOWED, SHARP] = [1.5, 1]; // m/s at most for who is more than so many radians off his way
 const HURRY = 0.8; // m/s more than they go, as an average of 0.3 s has it: people gain 3 m/s² or less
+const STARTS = 0.5; // m/s; who is slower, and more than SHARP off, turns before he goes
+const WALKS = 0.9; // m/s; who is slower goes, to a part, where he faces
 export const STILL = 0.15; // m/s; who is asked for less is asked to stand
 const [ON_THE_SPOT, NEAR] = [0.5, 0.35]; // radians off beyond which, and on to which, who stands turns
 const [BRAKE, THERE] = [1, 0.25]; // 1/s, speed a metre before an end; m from it, where one stands
 const BEHIND = 2.6; // radians off, beyond which left and right are as good: the side that is begun stays
 const [LOOK, LEAST_LOOK] = [0.6, 0.5]; // seconds ahead, and metres at least, that are aimed at on a path
+
+/** How much of a walk it is, from 0, a stand, to 1. */
+export const walks = ({ pace }) => clamp((pace - STANDING) / (WALKS - STANDING), 0, 1);
+
+/** Which way he goes, radians. The slower, the more is it the way he faces, and at a stand nothing else. */
+export const course = (going) => {
+  const { yaw } = going.place;
+  return yaw + walks(going) * wrapped(Math.atan2(...going.velocity) - yaw);
+};
 
 export class Aim {
   /** `speed` m/s, `direction` radians (0 is +z, π/2 is +x), or a `path` (Path), of which `arc` metres are behind. */
@@ -30,7 +41,7 @@ export class Aim {
   /** Speed m/s, bend rad/s and radians off the way, as of now; `ahead`: seconds since the arc was true. */
   wanted(going, ahead = 0) {
     const { speed, way, bend } = this.way(going, ahead);
-    let off = wrapped(way - going.bearing);
+    let off = wrapped(way - course(going));
     if (Math.abs(off) > BEHIND && Math.abs(going.turn) > 0.2) off = Math.abs(off) * Math.sign(going.turn);
     const still = speed < STILL;
     if (still) {
@@ -39,8 +50,9 @@ export class Aim {
     }
     const sharp = Math.abs(off) > SHARP && !still;
     const most = Math.min(SIDEWAYS / Math.max(going.pace, 0.1), BEND);
+    const slowed = going.pace < STARTS ? 2 * STILL : SLOWED;
     return {
-      speed: Math.min(sharp ? Math.min(speed, SLOWED) : speed, Math.max(going.pace + HURRY, 2 * STILL)),
+      speed: Math.min(sharp ? Math.min(speed, slowed) : speed, Math.max(going.pace + HURRY, 2 * STILL)),
       bend: clamp(bend === null || still ? GAIN * off : bend, -most, most),
       off,
     };

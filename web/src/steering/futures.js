@@ -2,7 +2,7 @@
 // inside of motionlab/solvers/live_ways.py, a frame at a time, so that a page can do something else in between.
 import { clamp, wrapped } from "../network/going.js";
 import { choose, nextNoise, point } from "../network/mixture.js";
-import { STILL } from "./aim.js";
+import { course, STILL, walks } from "./aim.js";
 import { bound, READY, settle } from "./live_frame.js";
 
 export const WINDOW = 5; // frames that are decided at a time: the paper's
@@ -20,12 +20,12 @@ const half = (off, spread) => (off / spread) ** 2 / 2;
 export function pushed(going, { speed, bend }) {
   const { place: { yaw }, velocity: [x, z], fps } = going;
   const turn = clamp(SHARE * (bend - going.turn), -TURN, TURN);
-  if (speed < STILL) {
-    const [sine, cosine] = [Math.sin(yaw), Math.cos(yaw)];
-    const held = [x * cosine - z * sine, x * sine + z * cosine].map((moved) => clamp(-HOLD * moved, -AGAINST, AGAINST));
-    return [...held, turn].map((value) => value / fps);
-  }
-  return [0, clamp(SHARE * (speed - going.pace), -PACE, PACE), turn].map((value) => value / fps);
+  const [sine, cosine] = [Math.sin(yaw), Math.cos(yaw)];
+  const [left, ahead] = [x * cosine - z * sine, x * sine + z * cosine]; // as he goes
+  const held = (moved) => clamp(-HOLD * moved, -AGAINST, AGAINST);
+  const aside = (1 - walks(going)) * clamp(-SHARE * left, -PACE, PACE); // who is slow goes where he faces
+  const step = speed < STILL ? [held(left), held(ahead)] : [aside, clamp(SHARE * (speed - going.pace), -PACE, PACE)];
+  return [...step, turn].map((value) => value / fps);
 }
 
 export class Futures {
@@ -92,7 +92,7 @@ export class Futures {
   energy({ going, feet, moved, input }) {
     if (!this.judged) return 0;
     const { speed, bend, off } = this.wanted;
-    const left = off - wrapped(going.bearing - this.was.bearing);
+    const left = off - wrapped(course(going) - course(this.was));
     const still = speed < STILL;
     const body = still ? (CALM * moved) / ((WINDOW - 1) * (input.length - ROOT)) : half(left, WAY);
     const minds = (term) => this.settings[`term ${term}`] ?? 1;

@@ -9,7 +9,8 @@ const [SWING, SLOWER] = [1.2, 2]; // the same of a turn, rad/s
 const [ASIDE, BACK] = [0.6, 0.2]; // m/s at most: who is steered turns and goes ahead, and is not dragged
 export const READY = 0.6; // m/s; who stops and is slower brings his feet together
 const [DAMPED, PULLED] = [0.6, 0.15]; // shares, of their moves that is taken, of what lacks to a stand, a frame
-const [RESTS, GLIDES] = [0.5, 0.3]; // m/s of a foot at most; seconds without: a run's flight is shorter
+const [SLIDES, RESTS] = [0.5, [0.2, 0.5]]; // share of his pace at which a foot rests at most; m/s of that
+const GLIDES = 0.3; // seconds without: a run's flight is shorter
 
 /**
  * Make a frame `input`, normalised, what a body can do who is asked for this, in place. `columns`: those of the step to
@@ -44,11 +45,12 @@ export class Gliding {
     const { encoding, feet, fps, starts, network, layers } = this.parts;
     let place = { x: 0, z: 0, yaw: 0 };
     let last = feet.seen(before, place);
+    const rests = clamp(SLIDES * best.going.pace, ...RESTS);
     let rested = false;
     for (const row of best.rows) {
       place = encoding.walk(place, row);
       const now = feet.seen(row, place);
-      rested ||= fps * feet.slowest(last, now) < RESTS;
+      rested ||= fps * feet.slowest(last, now) < rests;
       last = now;
     }
     this.frames = rested ? 0 : this.frames + best.rows.length;
