@@ -23,9 +23,9 @@ from torch import nn
 import motionlab
 from motionlab import Motion, corrupt, filters, metrics, solvers
 from motionlab.errors import DataError
-from motionlab.solvers.denoise import clean_jobs, see
-from motionlab.solvers.denoise_seen import motion_of, smooth
-from motionlab.solvers.denoise_windows import Job, Settings
+from motionlab.solvers.denoise import clean_jobs, job_of, see
+from motionlab.solvers.denoise_seen import motion_of
+from motionlab.solvers.denoise_windows import Settings
 from motionlab.training import Prepared
 from motionlab.weights import find
 
@@ -116,10 +116,7 @@ def by_ours(model: nn.Module, judged: list[Case]) -> dict:
     """As `solvers.denoise`, told what is missing and nothing else; and what it would say if it never
     stepped back. Each with its motions, to be looked at."""
     encoding, begin = model.encoding, time.process_time()
-    jobs = []
-    for case in judged:
-        seen, levels = see(encoding, case.seen, None, case.missing)
-        jobs.append(Job(seen, levels, smooth(seen, levels, encoding.fps)))
+    jobs = [job_of(encoding, *see(encoding, case.seen, None, case.missing)) for case in judged]
     done = clean_jobs(model, jobs, Settings())
     seconds = time.process_time() - begin
     found = {OURS: [its.rows for its in done],
@@ -184,8 +181,7 @@ def first_frame(model: nn.Module, truths: list[Motion]) -> dict:
     ways = {"zeros": Settings(), "found": replace(Settings(), first_state=True)}
     found = {}
     for name, settings in ways.items():
-        seen = [see(encoding, case.seen, noises.MID, None) for case in of]
-        jobs = [Job(its, levels, smooth(its, levels, encoding.fps)) for its, levels in seen]
+        jobs = [job_of(encoding, *see(encoding, case.seen, noises.MID, None)) for case in of]
         done = clean_jobs(model, jobs, settings)
         motions = [motion_of(encoding, (its.cleaned or its).rows) for its in done]
         hops = [hop(motion, case.truth) for motion, case in zip(motions, of, strict=True)]

@@ -12,7 +12,15 @@ from motionlab.errors import MotionError, RetargetError, SolverError
 from motionlab.motion import Motion
 from motionlab.skeleton import Skeleton
 from motionlab.solvers import NoiseLevels, clean_recording, denoise
-from motionlab.solvers.denoise_seen import Seen, levels_of, motion_of, rows_of, smooth, whittaker
+from motionlab.solvers.denoise_seen import (
+    Seen,
+    cross_validated,
+    levels_of,
+    motion_of,
+    rows_of,
+    smooth,
+    whittaker,
+)
 from motionlab.solvers.denoise_windows import Settings, _share, _windows
 
 LEVELS = NoiseLevels(0.02, 0.08)
@@ -212,6 +220,23 @@ def test_recordings_that_cannot_be_cleaned_are_refused(clips, model):
         replace(clip, root_positions=clip.root_positions * torch.nan)
 
 
+@pytest.mark.parametrize("hertz", [0.5, 4.0])
+def test_a_line_by_cross_validation_is_as_free_as_the_clip(hertz):
+    """Who is slow is smoothed as by the line that is set for walks; who is fast, much less."""
+    time = torch.arange(120).double() / 30
+    truth = torch.sin(2 * torch.pi * hertz * time)[:, None] * torch.linspace(0.2, 1, 12).double()
+    generator = torch.Generator().manual_seed(0)
+    level = NoiseLevels(0.02, 0.08)
+    scale = torch.tensor([level.root_m] * 3 + [level.angle_rad] * 9).double()
+    rows = truth + scale * torch.randn(truth.shape, generator=generator).double()
+    mask = torch.ones_like(rows).bool()
+    mask[40:43] = False
+    seen = Seen(torch.where(mask, rows, 1e6), mask, torch.zeros(120).bool())
+    free, set_for_walks = (way(seen, level) for way in (cross_validated, smooth))
+    off = lambda line: float((line - truth).square().mean().sqrt())
+    assert off(free) < (1.1 if hertz < 1 else 0.7) * off(set_for_walks)
+
+
 def test_motion_that_the_network_does_not_know_is_only_smoothed(clips, model):
     """A walk on hands: nobody learned that, and what comes back is the filter's answer."""
     upside = roma.rotvec_to_rotmat(torch.tensor([3.0, 0.0, 0.0]))
@@ -225,7 +250,7 @@ def test_motion_that_the_network_does_not_know_is_only_smoothed(clips, model):
     whole = Seen(rows, torch.ones_like(rows).bool(), torch.zeros(90).bool())
     noise = NoiseLevels(*list(found.record["noise"].values())[:2])
     if not found.record["outliers"]:
-        line = motion_of(model.encoding, smooth(whole, noise))
+        line = motion_of(model.encoding, cross_validated(whole, noise))
         assert error(found.motion, line) < 0.01
     known = denoise(noisy(clips[0], LEVELS), model)
     assert known.record["way"] == "map"

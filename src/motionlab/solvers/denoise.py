@@ -42,6 +42,7 @@ from .denoise_seen import (
     LEAST_ROOT,
     NoiseLevels,
     Seen,
+    cross_validated,
     joints_of,
     levels_of,
     motion_of,
@@ -99,7 +100,8 @@ def denoise(
         * "noise": "root_m", "angle_rad", and whether they were "estimated";
         * "outliers": frames that were seen and not believed; "missing": share of joints not seen;
         * "way": "map", the likeliest motion; "filter", where the network does not know such motion
-          and the smooth line is what comes back; "unchanged", where there was nothing to clean;
+          and a smooth line is what comes back, as free as the clip asks for, or the start that was
+          given; "unchanged", where there was nothing to clean;
         * "likelihood" of the likeliest motion, nats a frame, and "least", below which it is not known;
         * "changed (cm)": farthest that a joint was moved, where it was seen;
         * "energy": nats a frame of each term, weighed; "evaluations" of it;
@@ -127,7 +129,9 @@ def denoise(
         see(model.encoding, clip, noise, mask) for clip, mask in zip(clips, masks, strict=True)
     ]
     jobs = [
-        Job(its, levels, _begin(model.encoding, clip, its, levels, first))
+        job_of(
+            model.encoding, its, levels, first and rows_of(model.encoding, start_of(clip, first))
+        )
         for clip, (its, levels), first in zip(clips, looked, starts, strict=True)
     ]
     done = clean_jobs(model, jobs, how, generator, progress)
@@ -168,7 +172,6 @@ def clean_jobs(
     """
     encoding = model.encoding
     needed = [job for job in jobs if always or not needs_nothing(job)]
-    lines = {id(job): job.rows for job in needed}
     total = how.rounds * sum(len(job.rows) for job in needed)
     found: list[Cleaned] = []
     with tqdm(total=total, unit="frame", disable=not progress, leave=False) as bar:
@@ -185,12 +188,14 @@ def clean_jobs(
         if id(job) not in cleaned:
             done.append(Done(job.seen.rows, "unchanged", float("nan"), float("nan"), None))
             continue
-        line, its = lines[id(job)], cleaned[id(job)]
+        its = cleaned[id(job)]
         toes = resting(encoding, its.rows, SLOW)[:, [1, 3]]
         likelihood, least = judge(model, its.rows, toes, job.noise)
         known = likelihood >= least
         done.append(
-            Done(its.rows if known else line, "map" if known else "filter", likelihood, least, its)
+            Done(its.rows, "map", likelihood, least, its)
+            if known
+            else Done(job.line, "filter", likelihood, least, its)
         )
     return done
 
@@ -206,6 +211,16 @@ def see(
     return seen, levels
 
 
+def job_of(
+    encoding: JointAngles, seen: Seen, levels: NoiseLevels, start: Tensor | None = None
+) -> Job:
+    """A clip, ready to be cleaned from a smooth line, or from the rows (frames, channels) of one."""
+    if start is not None:
+        return Job(seen, levels, start, start)
+    line = smooth(seen, levels, encoding.fps)
+    return Job(seen, levels, line, cross_validated(seen, levels, encoding.fps))
+
+
 def needs_nothing(job: Job) -> bool:
     """Whether all was seen, believed, and is as smooth as clean motion."""
     calm = job.noise.root_m < LEAST_ROOT and job.noise.angle_rad < LEAST_ANGLE
@@ -215,15 +230,6 @@ def needs_nothing(job: Job) -> bool:
 def resting(encoding: JointAngles, rows: Tensor, speed: float = 0.45) -> Tensor:
     """Whether heels and toes (frames, 4) of rows rest, by the paper's rule."""
     return label(motion_of(encoding, rows), speed=speed)
-
-
-def _begin(
-    encoding: JointAngles, clip: Motion, seen: Seen, levels: NoiseLevels, start: Motion | None
-) -> Tensor:
-    """Rows of the smooth line that the search begins with."""
-    if start is None:
-        return smooth(seen, levels, encoding.fps)
-    return rows_of(encoding, start_of(clip, start))
 
 
 def record_of(

@@ -40,6 +40,7 @@ from .denoise_seen import (
     PUSH_ROOT,
     NoiseLevels,
     Seen,
+    cross_validated,
     motion_of,
     smooth,
     whittaker,
@@ -122,21 +123,23 @@ def _cleaned(
     """The job of a motion on the model's body, what came of it, and its rows at the motion's rate."""
     encoding = model.encoding
     seen, levels = see(encoding, replace(body, fps=encoding.fps), noise, hidden)
-    line = smooth(seen, levels, body.fps)
+    line, calm = smooth(seen, levels, body.fps), cross_validated(seen, levels, body.fps)
     if abs(body.fps - encoding.fps) <= 1e-4 * encoding.fps:
-        job = Job(seen, levels, line)
+        job = Job(seen, levels, line, calm)
         (done,) = clean_jobs(model, [job], how, progress=progress)
         return job, done, done.rows
     own = torch.arange(len(line)).double() / body.fps
     known = torch.arange(int(own[-1] * encoding.fps + 1e-6) + 1).double() / encoding.fps
     few, fewer = _at(own, known, seen, levels, body.fps / encoding.fps)
     at = lambda rows: _between(own, rows, known)
-    job = Job(few, fewer, at(line))
-    whole = Job(seen, levels, line)
+    job = Job(few, fewer, at(line), at(calm))
+    whole = Job(seen, levels, line, calm)
     if needs_nothing(whole):
         nan = float("nan")
         return whole, Done(seen.rows, "unchanged", nan, nan, None), seen.rows
     (done,) = clean_jobs(model, [job], how, progress=progress, always=True)
+    if done.way == "filter":
+        return whole, done, calm
     change = CubicSpline(known.numpy(), (done.rows - at(line)).numpy(), bc_type="natural")
     change = torch.from_numpy(change(np.clip(own.numpy(), 0, float(known[-1]))))
     return whole, done, line + change

@@ -28,6 +28,10 @@ LEAST_ROOT, LEAST_ANGLE = 0.001, 0.004
 FPS = 30.0  # of what is said a frame
 # Accelerations, m and rad a frame², that a body is free to have; chosen on validation clips.
 PUSH_ROOT, PUSH_ANGLE = 0.0035, 0.016
+FREEDOMS, FOLDS = (
+    (0.5, 1.0, 2.0, 4.0, 8.0),
+    4,
+)  # times these, that a clip may ask for; see `cross_validated`
 # A frame is an outlier if it is so many spreads farther than usual from its neighbours' median, and more
 # than so many times the noise, or m and rad where there is less noise: no body jumps like that.
 OUTLIER, FAR, FAR_ROOT, FAR_ANGLE = 6.0, 2.5, 0.015, 0.05
@@ -128,19 +132,46 @@ def outliers_of(seen: Seen, noise: NoiseLevels) -> Tensor:
     return (far > usual + OUTLIER * torch.maximum(spread, 0.25 * usual)) & (far > FAR)
 
 
-def smooth(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:
+def smooth(
+    seen: Seen,
+    noise: NoiseLevels,
+    fps: float = FPS,
+    times: tuple[float, float] = (1.0, 1.0),
+    counts: Tensor | None = None,
+) -> Tensor:
     """Rows (frames, channels) on a line with as little acceleration as what was seen allows.
 
     For each channel that is ``min Σ (seen - x)² / σ² + Σ (x'')² / a²``, what a Kalman smoother finds
     for a body that is pushed at random (Whittaker 1923 found it before). Where nothing was seen it
     goes on as its ends ask; where nothing of a channel was seen at all it is 0, the mean pose.
+
+    times : factors on a, of the root and of angles. counts : (frames,), 0 where a frame is left out.
     """
     believed = seen.believed.double()
-    pushes = torch.full((seen.rows.shape[1],), PUSH_ANGLE).double()
+    if counts is not None:
+        believed = believed * counts[:, None]
+    pushes = torch.full((seen.rows.shape[1],), PUSH_ANGLE * times[1]).double()
     levels = torch.full_like(pushes, max(noise.angle_rad, LEAST_ANGLE))
-    pushes[ROOT], levels[ROOT] = PUSH_ROOT, max(noise.root_m, LEAST_ROOT)
+    pushes[ROOT], levels[ROOT] = PUSH_ROOT * times[0], max(noise.root_m, LEAST_ROOT)
     pushes *= (FPS / fps) ** 1.5  # pushes without a memory add up so
     return whittaker(seen.rows, believed, (levels / pushes).square())
+
+
+def cross_validated(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:
+    """Rows like those of `smooth`, as free to accelerate as this clip asks for: who runs or dances is more.
+
+    Every fourth frame is left out in turn; root and angles get the freedom with which the lines through
+    the others come nearest to what was seen there. It needs no network, and no clip but this one.
+    """
+    held = torch.arange(len(seen.rows)) % FOLDS
+    off = torch.zeros(len(FREEDOMS), 2).double()
+    for i, times in enumerate(FREEDOMS):
+        for fold in range(FOLDS):
+            line = smooth(seen, noise, fps, (times, times), (held != fold).double())
+            gaps = ((seen.rows - line).square() * seen.believed)[held == fold]
+            off[i] += torch.stack([gaps[:, ROOT].sum(), gaps[:, TURNS].sum()])
+    root, angles = (FREEDOMS[i] for i in off.argmin(0).tolist())
+    return smooth(seen, noise, fps, (root, angles))
 
 
 def whittaker(rows: Tensor, weights: Tensor, stiffness: Tensor) -> Tensor:

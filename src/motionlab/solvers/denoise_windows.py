@@ -58,12 +58,14 @@ class Settings:
 class Job:
     """One clip to be cleaned.
 
-    rows : (frames, channels), a smooth line to begin with; contacts : (frames, 2) from 0 to 1.
+    rows : (frames, channels), a smooth line to begin with; line : like them, what comes back if the
+        network knows no such motion. contacts : (frames, 2) from 0 to 1.
     """
 
     seen: Seen
     noise: NoiseLevels
     rows: Tensor
+    line: Tensor
     contacts: Tensor | None = None
 
 
