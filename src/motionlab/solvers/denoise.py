@@ -95,23 +95,27 @@ def denoise(
 
     Returns
     -------
-    Denoised : or a list, for a list. Its `motion` has contacts, of heels and toes. Its `record` has
-
-        * "noise": "root_m", "angle_rad", and whether they were "estimated";
-        * "outliers": frames that were seen and not believed; "missing": share of joints not seen;
-        * "way": "map", the likeliest motion; "filter", where the network does not know such motion
-          and a smooth line is what comes back, as free as the clip asks for, or the start that was
-          given; "unchanged", where there was nothing to clean;
-        * "likelihood" of the likeliest motion, nats a frame, and "least", below which it is not known;
-        * "changed (cm)": farthest that a joint was moved, where it was seen;
-        * "energy": nats a frame of each term, weighed; "evaluations" of it;
-        * "seconds": of the processor, the clip's share.
+    Denoised : or a list, for a list. Its `motion` has contacts, of heels and toes.
 
     Raises
     ------
     SolverError : a clip of too few frames, another rate or body, or of no person's size; a mask of
         another shape, or of all joints; levels or settings that make no sense; a model that has no
         likelihood. Nothing is cleaned then.
+
+    Notes
+    -----
+    The record has
+
+    * "noise": "root_m", "angle_rad", and whether they were "estimated";
+    * "outliers": frames that were seen and not believed; "missing": share of joints not seen;
+    * "way": "map", the likeliest motion; "filter", where the network does not know such motion and a
+      smooth line is what comes back, as free as the clip asks for, or the start that was given;
+      "unchanged", where there was nothing to clean;
+    * "likelihood" of the likeliest motion, nats a frame, and "least", below which it is not known;
+    * "changed (cm)": farthest that a joint was moved, where it was seen;
+    * "energy": nats a frame of each term, weighed; "evaluations" of it;
+    * "seconds": of the processor, the clip's share.
     """
     alone = isinstance(motions, Motion)
     clips = [motions] if alone else list(motions)

@@ -32,10 +32,14 @@ LOOSE = 0.5  # of the noise, by which a window may begin elsewhere than the smoo
 class Settings:
     """How a clip is cleaned.
 
+    Parameters
+    ----------
     window, overlap : frames of a window, and of those that it shares with the next.
     memory : frames of the smooth line that are read before a window.
     rounds : times that it is done; each begins with what the one before it found, and with feet down
-        where they are slow there. method, steps : of `window.solve`, in each. batch : windows that are solved side by side.
+        where they are slow there.
+    method, steps : of `window.solve`, in each round.
+    batch : windows that are solved side by side.
     prior, contact : factors on these terms (eq. 16, 19), 0 leaves one out. The observation's is 1.
     disturbed : whether the network's inputs may be disturbed, d of eq. 17.
     first_state : whether the memory before a clip's first frame is found by gradient (eq. 27).
@@ -58,8 +62,12 @@ class Settings:
 class Job:
     """One clip to be cleaned.
 
-    rows : (frames, channels), a smooth line to begin with; line : like them, what comes back if the
-        network knows no such motion. contacts : (frames, 2) from 0 to 1.
+    Parameters
+    ----------
+    seen, noise : see `denoise_seen`.
+    rows : (frames, channels), a smooth line to begin with.
+    line : like them, what comes back if the network knows no such motion.
+    contacts : (frames, 2) from 0 to 1.
     """
 
     seen: Seen
