@@ -28,10 +28,8 @@ LEAST_ROOT, LEAST_ANGLE = 0.001, 0.004
 FPS = 30.0  # of what is said a frame
 # Accelerations, m and rad a frame², that a body is free to have; chosen on validation clips.
 PUSH_ROOT, PUSH_ANGLE = 0.0035, 0.016
-FREEDOMS, FOLDS = (
-    (0.5, 1.0, 2.0, 4.0, 8.0),
-    4,
-)  # times these, that a clip may ask for; see `cross_validated`
+# Times these, that a clip may ask for, and how near to the least error is enough; see `cross_validated`.
+FREEDOMS, FOLDS, NEARLY = (0.5, 1.0, 2.0, 4.0, 8.0), 4, 0.03
 # A frame is an outlier if it is so many spreads farther than usual from its neighbours' median, and more
 # than so many times the noise, or m and rad where there is less noise: no body jumps like that.
 OUTLIER, FAR, FAR_ROOT, FAR_ANGLE = 6.0, 2.5, 0.015, 0.05
@@ -160,8 +158,9 @@ def smooth(
 def cross_validated(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:
     """Rows like those of `smooth`, as free to accelerate as this clip asks for: who runs or dances is more.
 
-    Every fourth frame is left out in turn; root and angles get the freedom with which the lines through
-    the others come nearest to what was seen there. It needs no network, and no clip but this one.
+    Every fourth frame is left out in turn, and the lines through the others are held against what was
+    seen there. Root and angles get the least freedom whose error is nearly the smallest, as who has
+    fewer frames to go by asks for too much. It needs no network, and no clip but this one.
     """
     held = torch.arange(len(seen.rows)) % FOLDS
     off = torch.zeros(len(FREEDOMS), 2).double()
@@ -170,7 +169,8 @@ def cross_validated(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:
             line = smooth(seen, noise, fps, (times, times), (held != fold).double())
             gaps = ((seen.rows - line).square() * seen.believed)[held == fold]
             off[i] += torch.stack([gaps[:, ROOT].sum(), gaps[:, TURNS].sum()])
-    root, angles = (FREEDOMS[i] for i in off.argmin(0).tolist())
+    enough = off <= (1 + NEARLY) * off.min(0).values
+    root, angles = (FREEDOMS[i] for i in enough.int().argmax(0).tolist())  # the first that is
     return smooth(seen, noise, fps, (root, angles))
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from experiments.rnn_gan.pace_attempts import DATA, TRAINED, drawn, helps, run_of
+from experiments.rnn_gan.pace_attempts import DATA, MORE, TRAINED, drawn, helps, run_of
 
 
 def found(walk: float = 1.0, run: float | None = 1.0, likelihood: float = 50.0) -> dict:
@@ -49,4 +49,4 @@ def test_every_training_begins_with_what_ships_in_a_folder_of_its_own():
     runs = [run_of(row, model) for model in DATA for row in TRAINED]
     assert len({run.folder for run in runs}) == len(runs)
     assert {run.first.stem for run in runs} == set(DATA)
-    assert {run.preset.updates for run in runs} == {1_000}
+    assert {run.preset.updates for run in runs} == {MORE["updates"]}
