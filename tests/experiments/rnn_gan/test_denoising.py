@@ -80,8 +80,8 @@ def test_ours_is_what_denoise_says(truths):
                                         found["rows"]["ours"]["ways"], strict=True):  # fmt: skip
         its = solvers.denoise(case.seen, model, missing=case.missing)
         # side by side and alone, what is rounded otherwise grows over sixty steps, most in the gap
-        assert (root - its.motion.root_positions).abs().mean() < 5e-3
-        assert (turns - its.motion.rotations).abs().mean() < 1e-2
+        assert (root - its.motion.root_positions).abs().mean() < 2e-2
+        assert (turns - its.motion.rotations).abs().mean() < 3e-2
         assert way == its.record["way"]
 
 
