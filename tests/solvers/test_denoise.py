@@ -220,6 +220,21 @@ def test_recordings_that_cannot_be_cleaned_are_refused(clips, model):
         replace(clip, root_positions=clip.root_positions * torch.nan)
 
 
+@pytest.mark.parametrize("clean", [denoise, clean_recording])
+def test_of_a_calm_clip_only_wild_frames_are_changed(clean, clips, model):
+    """A recording without noise, but for two frames in which the root is elsewhere."""
+    places = clips[0].root_positions.clone()
+    places[[30, 60]] += torch.tensor([0.5, 0.0, 0.3])
+    wild = replace(clips[0], root_positions=places, contacts=None)
+    found = clean(wild, model)
+    assert {30, 60} <= set(found.record["outliers"]) and found.record["elsewhere as it was"]
+    moved = (found.motion.positions() - wild.positions()).norm(dim=-1).amax(1)
+    doubted = torch.tensor(found.record["outliers"])
+    away = (torch.arange(len(wild))[:, None] - doubted).abs().amin(1) > 2
+    assert away.sum() > 60 and not moved[away].any()
+    assert error(found.motion[30:31], clips[0][30:31]) < 5 < error(wild[30:31], clips[0][30:31])
+
+
 @pytest.mark.parametrize("hertz", [0.5, 4.0])
 def test_a_line_by_cross_validation_is_as_free_as_the_clip(hertz):
     """Who is slow is smoothed as by the line that is set for walks; who is fast, much less."""

@@ -78,6 +78,8 @@ class Clean(Written):
             said.append(f"{len(frames)} frames not believed ({some})")
         if record["way"] == "filter":
             said.append("the network does not know such motion, so it was only smoothed")
+        if record["elsewhere as it was"]:
+            said.append("the rest is calm: only these and two frames on each side were changed")
         return found, [*said, f"joints moved by up to {record['changed (cm)']:.1f} cm"]
 
 

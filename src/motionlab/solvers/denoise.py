@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
+import roma
 import torch
 from torch import Tensor, nn
 from tqdm import tqdm
@@ -55,6 +56,7 @@ from .denoise_windows import Cleaned, Job, Settings, clean
 MODEL = "lstm-gmm-contacts"
 # m/s below which a toe is taken to rest while noise is still left on it; the labels' own is 0.45
 SLOW = 0.6
+BORDER = 2  # frames over which a calm recording fades into one that was mended
 
 
 class Denoised(NamedTuple):
@@ -114,6 +116,8 @@ def denoise(
       "unchanged", where there was nothing to clean;
     * "likelihood" of the likeliest motion, nats a frame, and "least", below which it is not known;
     * "changed (cm)": farthest that a joint was moved, where it was seen;
+    * "elsewhere as it was": whether the clip is calm, so that only frames which were not seen or not
+      believed were changed, and two to both sides of them;
     * "energy": nats a frame of each term, weighed; "evaluations" of it;
     * "seconds": of the processor, the clip's share.
     """
@@ -144,7 +148,7 @@ def denoise(
     for clip, job, its in zip(clips, jobs, done, strict=True):
         motion = clip
         if its.way != "unchanged":
-            motion = motion_of(model.encoding, its.rows, clip)
+            motion = mended(clip, motion_of(model.encoding, its.rows, clip), job)
             motion = replace(motion, contacts=label(motion))
         seen = job.seen.mask[:, 5::3]  # one channel of each joint
         record = record_of(clip, motion, seen, job, its, noise is None, share * len(clip))
@@ -227,8 +231,32 @@ def job_of(
 
 def needs_nothing(job: Job) -> bool:
     """Whether all was seen, believed, and is as smooth as clean motion."""
-    calm = job.noise.root_m < LEAST_ROOT and job.noise.angle_rad < LEAST_ANGLE
-    return calm and bool(job.seen.believed.all())
+    return calm(job.noise) and bool(job.seen.believed.all())
+
+
+def calm(noise: NoiseLevels) -> bool:
+    """Whether a clip is as smooth as clean motion where it was seen and believed."""
+    return noise.root_m < LEAST_ROOT and noise.angle_rad < LEAST_ANGLE
+
+
+def mended(before: Motion, after: Motion, job: Job) -> Motion:
+    """A clean motion; of a calm one only those frames that were not seen or not believed.
+
+    Over BORDER frames to both sides the recording fades into them; all others are as they were.
+    """
+    doubtful = (~job.seen.believed.all(1)).nonzero()[:, 0]
+    if not calm(job.noise) or not len(doubtful):
+        return after
+    away = (torch.arange(len(before))[:, None] - doubtful).abs().amin(1)
+    share = (1 - away / (BORDER + 1)).clamp(min=0).to(before.root_positions)[:, None]
+    turns = roma.rotmat_to_rotvec(before.rotations.mT @ after.rotations)
+    rotations = before.rotations @ roma.rotvec_to_rotmat(share[..., None] * turns)
+    return replace(
+        before,
+        root_positions=before.root_positions.lerp(after.root_positions, share),
+        rotations=torch.where(share[..., None, None] > 0, rotations, before.rotations),
+        contacts=None,
+    )
 
 
 def resting(encoding: JointAngles, rows: Tensor, speed: float = 0.45) -> Tensor:
@@ -256,6 +284,7 @@ def record_of(
         "likelihood": done.likelihood,
         "least": done.least,
         "changed (cm)": 100 * float(far[seen].max()),
+        "elsewhere as it was": calm(job.noise),
         "energy": its.parts if its else {},
         "evaluations": its.evaluations if its else 0,
         "seconds": seconds,

@@ -30,7 +30,16 @@ from ..retargeting.rest_alignment import limb_length
 from ..roles import SIDES
 from ..skeleton import Skeleton
 from ..weights import load
-from .denoise import MODEL, Denoised, Done, clean_jobs, needs_nothing, record_of, see
+from .denoise import (
+    MODEL,
+    Denoised,
+    Done,
+    clean_jobs,
+    mended,
+    needs_nothing,
+    record_of,
+    see,
+)
 from .denoise_checks import FEWEST, check_clip, check_model, check_settings, mask_of
 from .denoise_seen import (
     FPS,
@@ -108,6 +117,7 @@ def clean_recording(
     else:
         after = replace(motion_of(encoding, rows, body), fps=body.fps)
         found = after if body is motion else brought_back(motion, body, after, job.noise, unseen)
+        found = mended(motion, found, job)
     seconds = time.process_time() - begin
     return Denoised(found, record_of(motion, found, ~unseen, job, done, noise is None, seconds))
 
