@@ -137,7 +137,8 @@ def compared(methods: dict[str, dict]) -> dict:
     best = min(rivals.FILTERS, key=lambda name: sum(methods[name]["each"][ERROR]))
     against = lambda what, who=OURS: ratio(methods[who], methods[best], what)
     means = {
-        name: {"means": {k: metrics.bootstrap(its) for k, its in row["each"].items()}} | row
+        name: {"means": {k: metrics.bootstrap(its) for k, its in row["each"].items()}}
+        | {key: its for key, its in row.items() if key != "each"}
         for name, row in methods.items()
     }
     found = {"clips": len(methods[OURS]["ways"]), "methods": means, "best filter": best,
