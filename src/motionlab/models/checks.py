@@ -107,3 +107,10 @@ def check_noise(noise: float) -> None:
     """Raise ModelError if this is no standard deviation."""
     if not isinstance(noise, Real) or not 0 <= noise < math.inf:
         raise ModelError(f"generate: noise is {noise!r}; it must be a number, 0 or more.")
+
+
+def check_counts(kind: str, **counts: int) -> None:
+    """Raise ModelError for numbers of frames that are no whole numbers from 1."""
+    for what, value in counts.items():
+        if not isinstance(value, Integral) or value < 1:
+            raise ModelError(f"{kind}: {what} is {value!r}; it must be a whole number from 1.")

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
-from .checks import as_features, check_normalizer, checked_features
+from .checks import as_features, check_counts, check_normalizer, checked_features
 from .overlap import rows_of_windows
 
 
@@ -32,9 +32,7 @@ class Ridge(nn.Module):
     ) -> None:
         super().__init__()
         check_normalizer(encoding, normalizer)
-        for what, value in (("encode", encode), ("predict", predict)):
-            if not isinstance(value, Integral) or value < 1:
-                raise ModelError(f"Ridge: {what} is {value!r}; it must be a whole number from 1.")
+        check_counts("Ridge", encode=encode, predict=predict)
         self.encoding, self.normalizer = encoding, normalizer
         self.encode, self.predict = encode, predict
         self.kept = kept = len(normalizer.kept)
