@@ -63,10 +63,12 @@ def forward_kinematics(
     world = [local[:1]]
     points = [root_positions.reshape(1, math.prod(batch), 3).mT]
     for members, parents_in_level in levels:
-        parent = world[-1][parents_in_level]
-        points.append(points[-1][parents_in_level] + _turn(parent, offsets[members]))
+        parent, start = world[-1], points[-1]
+        if parents_in_level is not None:
+            parent, start = parent[parents_in_level], start[parents_in_level]
+        points.append(start + _turn(parent, offsets[members]))
         world.append(_product(parent, local[members]))
-    orientations, positions = torch.cat(world)[order], torch.cat(points)[order]
+    orientations, positions = _in_order(world, order), _in_order(points, order)
     if len(end_parents):
         ends = list(end_parents)
         tips = positions[ends] + _turn(orientations[ends], end_offsets.to(rotations))
@@ -109,11 +111,12 @@ def yaw_matrix(yaw: Tensor) -> Tensor:
 @lru_cache(maxsize=64)
 def _levels(
     parents: tuple[int, ...], device: torch.device
-) -> tuple[list[tuple[Tensor, Tensor]], Tensor]:
+) -> tuple[list[tuple[Tensor, Tensor | None]], list[int]]:
     """Joints by their distance from the root.
 
     Returns for each level below the root its joints and where in the level above their parents
-    are, and the order that brings the joints of all levels, root first, back into their own.
+    are (None: one each, in this order), and the order that brings the joints of all levels, root
+    first, back into their own.
     """
     depth, place = [0], [0]
     members: list[list[int]] = [[0]]
@@ -128,10 +131,20 @@ def _levels(
     # Kept for later calls: made while sampling, they must serve when training.
     with torch.inference_mode(False):
         levels = [
-            (torch.tensor(level, device=device), torch.tensor(rows, device=device))
-            for level, rows in zip(members[1:], above, strict=True)
+            (
+                torch.tensor(level, device=device),
+                None if rows == [*range(len(before))] else torch.tensor(rows, device=device),
+            )
+            for before, level, rows in zip(members, members[1:], above, strict=False)
         ]
-        return levels, torch.tensor(flat, device=device).argsort()
+    order = sorted(range(len(flat)), key=flat.__getitem__)
+    return levels, order
+
+
+def _in_order(levels: list[Tensor], order: list[int]) -> Tensor:
+    """Joints of all levels in their own order, copied once."""
+    joints = [joint for level in levels for joint in level.unbind()]
+    return torch.stack([joints[i] for i in order])
 
 
 def _product(a: Tensor, b: Tensor) -> Tensor:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import reduce
+from operator import and_, or_
 
 import torch
 from torch import Tensor
@@ -112,10 +114,12 @@ def lock(
     ground = _ground(toes, held, flat, floor)
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
         onto = _onto_places(toes, held, ground)
-        ankle = at["foot"] + onto
-        ankle[..., 1] -= _usual(onto[..., 1], held)  # what a lower floor asks of all contacts alike
-        deep = _needed(at, ankle) > deepest
-        held = held & (length(onto) < FARTHEST) & ~deep
+        rests = held & (length(onto) < FARTHEST)
+        if deepest < math.inf:
+            ankle = at["foot"] + onto
+            ankle[..., 1] -= _usual(onto[..., 1], held)  # what a lower floor asks of all alike
+            rests = rests & (_needed(at, ankle) <= deepest)
+        held = rests
     shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
     shift = _above(shift, at, ground, ground - flat)
     ankle = at["foot"] + shift
@@ -139,9 +143,14 @@ def _clean(contacts: Tensor, fps: float) -> Tensor:
 
 
 def _closed(marks: Tensor, most: int) -> Tensor:
-    """Gaps of at most so many frames between two marks filled, along the frames (..., frames, 2)."""
-    since, until = _distance(marks, before=True), _distance(marks, before=False)
-    return marks | (since + until - 1 <= most)
+    """Gaps of at most so many frames between two marks filled, along the frames (..., frames, 2).
+
+    Closing of binary morphology: filled is where every window of one frame more has a mark.
+    """
+    frames = marks.shape[-2]
+    beyond = pad(marks, (0, 0, most, most))
+    near = reduce(or_, (beyond[..., i : i + frames + most, :] for i in range(most + 1)))
+    return reduce(and_, (near[..., i : i + frames, :] for i in range(most + 1)))
 
 
 def _opened(marks: Tensor, most: int) -> Tensor:
@@ -200,13 +209,16 @@ def _onto_places(toes: Tensor, held: Tensor, ground: Tensor) -> Tensor:
 
     A place is where a toe joint is on average over one contact, on the ground.
     """
-    index = _numbered(held)[..., None].expand_as(toes)
-    none = toes.new_zeros(*toes.shape[:-3], toes.shape[-3] + 1, 2, 3)
-    sums = none.scatter_add(-3, index, toes)
-    counts = none.scatter_add(-3, index, torch.ones_like(toes))
+    number = _numbered(held).mT[..., None, :]
+    along = toes.movedim(-3, -1)  # frames last, as they lie in memory
+    index = number.expand_as(along)
+    none = along.new_zeros(*along.shape[:-1], along.shape[-1] + 1)
+    sums = none.scatter_add(-1, index, along)
+    counts = none[..., :1, :].scatter_add(-1, number, torch.ones_like(along[..., :1, :]))
     places = sums / counts.clamp(min=1)
-    places[..., 1] = ground[..., None, :]
-    return (places.gather(-3, index) - toes) * held[..., None]
+    places[..., 1, :] = ground[..., None]
+    onto = (places.gather(-1, index) - along) * held.mT[..., None, :]
+    return onto.movedim(-1, -3)
 
 
 def _shift(onto: Tensor, held: Tensor, blend: float) -> Tensor:
@@ -251,7 +263,7 @@ def _needed(at: dict[str, Tensor], ankle: Tensor) -> Tensor:
     stays = length(foot - hip).minimum(longest) - (length(ankle - foot) - NEAR).clamp(min=0)
     reach = torch.maximum(REACH * longest, stays)
     way = hip - ankle
-    level = way[..., [0, 2]].square().sum(-1)
+    level = way[..., 0].square() + way[..., 2].square()
     needed = way[..., 1] - (reach.square() - level).clamp(min=1e-4).sqrt()
     return torch.where(needed > 1e-4, needed, 0)
 
