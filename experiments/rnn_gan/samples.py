@@ -289,7 +289,7 @@ def likeness(
     return found
 
 
-def novelty(heads: Tensor, data: Prepared, encoding: Encoding) -> dict:
+def novelty(heads: Tensor, data: Prepared, encoding: Encoding, split: str = "test") -> dict:
     """How far windows of samples, and of held-out clips, are from the nearest training window."""
     if not len(heads):
         return {}
@@ -297,7 +297,7 @@ def novelty(heads: Tensor, data: Prepared, encoding: Encoding) -> dict:
     of = lambda clips, encoding: [
         body.encode(encoding.to_motion(clip)) for clip in clips if len(clip) >= 2 * fps
     ]
-    training, held_out = (of(data.clips(split), data.encoding) for split in ("train", "test"))
+    training, held_out = (of(data.clips(some), data.encoding) for some in ("train", split))
     normalizer = Normalizer.fit(training)
     training, held_out, samples = (
         list(map(normalizer, some)) for some in (training, held_out, of(heads, encoding))
