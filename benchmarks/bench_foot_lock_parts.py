@@ -26,6 +26,7 @@ from torch import Tensor
 
 import motionlab
 from motionlab.feet import lock as feet
+from motionlab.feet import marks as marks_of
 from motionlab.feet.legs import legs_alone
 from motionlab.kinematics import _in_order, _product
 
@@ -91,10 +92,10 @@ def main(options: Options) -> None:
 
 def gaps(marks: Tensor) -> dict[str, Callable]:
     def by_distances() -> Tensor:
-        since, until = (feet._distance(marks, before) for before in (True, False))
+        since, until = (marks_of.distance(marks, before) for before in (True, False))
         return marks | (since + until - 1 <= GAP)
 
-    by_shifts = lambda: feet._closed(marks, GAP)
+    by_shifts = lambda: marks_of.closed(marks, GAP)
     assert (by_distances() == by_shifts()).all()
     return {"plain": by_distances, "new": by_shifts}
 
@@ -105,7 +106,7 @@ def places(held: Tensor) -> dict[str, Callable]:
     ground = torch.zeros(*frames[:-1], 2)
 
     def axes_last() -> Tensor:
-        number = feet._numbered(held)[..., None].expand_as(toes)
+        number = marks_of.numbered(held)[..., None].expand_as(toes)
         none = toes.new_zeros(*frames[:-1], frames[-1] + 1, 2, 3)
         sums = none.scatter_add(-3, number, toes)
         found = sums / none.scatter_add(-3, number, torch.ones_like(toes)).clamp(min=1)

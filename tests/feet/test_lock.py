@@ -17,7 +17,8 @@ from motionlab.datasets import gaits
 from motionlab.errors import ModelError
 from motionlab.feet.contacts import foot_points
 from motionlab.feet.legs import PARTS, leg_joints
-from motionlab.feet.lock import STRAIGHT, _clean, lock
+from motionlab.feet.lock import STRAIGHT, lock
+from motionlab.feet.marks import clean
 from motionlab.metrics import foot_skate
 from motionlab.roles import SIDES
 from motionlab.solvers import lock_feet
@@ -39,7 +40,7 @@ def toes_of(motion):
 
 def held_steps(motion, down):
     """Millimetres that toes move from frame to frame while they are held throughout."""
-    held = _clean(down, motion.fps)
+    held = clean(down, motion.fps)
     steps = 1000 * toes_of(motion).diff(dim=0).norm(dim=-1)
     return steps[held[1:] & held[:-1]]
 
@@ -291,8 +292,8 @@ def test_a_rest_pose_that_hangs_from_its_root_has_a_floor_too():
 
 def test_gaps_are_filled_and_flickers_left_out():
     row = torch.tensor([int(x) for x in "0011110111100010000"]).bool()[:, None].repeat(1, 2)
-    clean = "".join(str(int(x)) for x in _clean(row, 30)[:, 0])
-    assert clean == "0011111111100000000"
+    joined = "".join(str(int(x)) for x in clean(row, 30)[:, 0])
+    assert joined == "0011111111100000000"
 
 
 def test_own_contacts_and_those_of_both_parts_of_a_foot_are_understood():

@@ -10,7 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from .lock import FARTHEST, FASTEST, GAP, RESTS, SHORTEST
+from .lock import FARTHEST, FASTEST, RESTS
+from .marks import GAP, SHORTEST
 from .one_leg import Vector, plus
 
 # m/s; of a contact's first frames those so much slower than the others tell its place

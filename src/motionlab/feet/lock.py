@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import reduce
-from operator import and_, or_
 
 import torch
 from torch import Tensor
@@ -22,9 +20,9 @@ from ..kinematics import forward_kinematics
 from ..motion import Motion
 from ..skeleton import Skeleton
 from .legs import PARTS, flat_toes, knee_fronts, leg_joints, leg_lengths, legs_alone
+from .marks import clean, distance, numbered, resting
 from .planting import off_the_floor, steps
 
-GAP, SHORTEST = 0.07, 0.1  # seconds: gaps that are filled, contacts that are too short to count
 FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, whatever its label
 FARTHEST = 0.12  # metres that a foot may be from its place and still be held there
 RESTS = 0.005  # m/s; a toe that is slower is still, and slides nowhere
@@ -109,7 +107,7 @@ def lock(
     at = {part: points[..., joints[part], :] for part in PARTS}  # (..., frames, 2, 3)
     toes = at["toes"]
     speeds = steps(toes) * fps
-    held = _resting(_clean(contacts & (speeds < FASTEST), fps), speeds < RESTS)
+    held = resting(clean(contacts & (speeds < FASTEST), fps), speeds < RESTS)
     flat = flat_toes(legs, points, held)
     ground = _ground(toes, held, flat, floor)
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
@@ -136,61 +134,6 @@ def lock(
 # -- where feet are to be ---------------------------------------------------------------------------
 
 
-def _clean(contacts: Tensor, fps: float) -> Tensor:
-    """Contacts (..., frames, 2) without gaps and flickers."""
-    gap, shortest = max(1, round(GAP * fps)), max(1, round(SHORTEST * fps))
-    return _opened(_closed(contacts, gap), shortest - 1)
-
-
-def _closed(marks: Tensor, most: int) -> Tensor:
-    """Gaps of at most so many frames between two marks filled, along the frames (..., frames, 2).
-
-    Closing of binary morphology: filled is where every window of one frame more has a mark.
-    """
-    frames = marks.shape[-2]
-    beyond = pad(marks, (0, 0, most, most))
-    near = reduce(or_, (beyond[..., i : i + frames + most, :] for i in range(most + 1)))
-    return reduce(and_, (near[..., i : i + frames, :] for i in range(most + 1)))
-
-
-def _opened(marks: Tensor, most: int) -> Tensor:
-    """Runs of at most so many marks taken away; those at the ends may go on beyond, and stay."""
-    return ~_closed(~marks, most)
-
-
-def _resting(held: Tensor, still: Tensor) -> Tensor:
-    """Contacts (..., frames, 2) in most of which a toe is still: from its first rest to its last.
-
-    Labels by speed begin and end in the air. Where nothing slides, nothing is to be held there.
-    """
-    number, rests = _numbered(held), held & still
-    frames = torch.arange(held.shape[-2], device=held.device)[:, None].expand_as(number)
-    none = torch.zeros_like(torch.cat([number[..., :1, :], number], dim=-2))
-    most = none.scatter_add(-2, number, 2 * rests - held.long()) > 0
-    first = none.scatter_reduce(
-        -2, number, torch.where(rests, frames, held.shape[-2]), "amin", include_self=False
-    )
-    last = none.scatter_reduce(-2, number, torch.where(rests, frames, -1), "amax")
-    within = (frames >= first.gather(-2, number)) & (frames <= last.gather(-2, number))
-    return held & (within | ~most.gather(-2, number))
-
-
-def _numbered(held: Tensor) -> Tensor:
-    """Which contact each frame (..., frames, 2) belongs to, from 1; 0 where there is none."""
-    begins = held & ~torch.cat([torch.zeros_like(held[..., :1, :]), held[..., :-1, :]], dim=-2)
-    return begins.long().cumsum(-2) * held
-
-
-def _distance(marks: Tensor, before: bool) -> Tensor:
-    """Frames (..., frames, 2) from each frame to the last mark before it (or the next after it)."""
-    frames = torch.arange(marks.shape[-2], device=marks.device)[:, None]
-    if before:
-        last = torch.where(marks, frames, -marks.shape[-2] * 4).cummax(-2).values
-        return frames - last
-    following = torch.where(marks, frames, marks.shape[-2] * 5).flip(-2).cummin(-2).values.flip(-2)
-    return following - frames
-
-
 def _ground(toes: Tensor, held: Tensor, flat: Tensor, floor: float | None) -> Tensor:
     """Heights (..., 2) of resting toe joints: the plane of contact."""
     if floor is not None:
@@ -209,7 +152,7 @@ def _onto_places(toes: Tensor, held: Tensor, ground: Tensor) -> Tensor:
 
     A place is where a toe joint is on average over one contact, on the ground.
     """
-    number = _numbered(held).mT[..., None, :]
+    number = numbered(held).mT[..., None, :]
     along = toes.movedim(-3, -1)  # frames last, as they lie in memory
     index = number.expand_as(along)
     none = along.new_zeros(*along.shape[:-1], along.shape[-1] + 1)
@@ -227,7 +170,7 @@ def _shift(onto: Tensor, held: Tensor, blend: float) -> Tensor:
     There, what the last frame of one contact asks for fades out and what the first of the next one
     asks for fades in, each over `blend` frames.
     """
-    since, until = _distance(held, before=True), _distance(held, before=False)
+    since, until = distance(held, before=True), distance(held, before=False)
     last = held.shape[-2] - 1
     at = torch.arange(last + 1, device=held.device)[:, None]
     before = onto.gather(-3, (at - since).clamp(min=0)[..., None].expand_as(onto))
