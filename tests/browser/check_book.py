@@ -6,8 +6,9 @@ Each page is opened from disk and from a local server, on a desktop and on a pho
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
 if a formula stays TeX; if a player stands still, does not follow its slider or saves nothing; if a
 scene stays empty or does not follow its own; if a network does not load and move, or too slowly; if a
-path that is drawn is not walked, or who is steered does not turn (these three from disk). It waits
-as long as a busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
+path that is drawn is not walked, or who is steered does not turn; if axe-core finds a grave fault for
+those who hear a page or use keys alone (these four from disk, on a desktop). It waits as long as a
+busy machine needs. Exit status 1, and one line for each trouble. Needs Chromium on the
 PATH (or its path in CHROMIUM).
 """
 
@@ -24,6 +25,7 @@ from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 
+from check_access import check_access
 from check_steered import check_steered
 from PIL import Image
 from playwright.sync_api import BrowserContext, Page, TimeoutError, sync_playwright
@@ -330,9 +332,8 @@ def check_page(window: BrowserContext, base: str, path: Path, folder: Path) -> l
     if visit.page.viewport_size["width"] == DESKTOP[0]:
         visit.check_players()
         visit.check_scenes()
-        if base.startswith(
-            "file:"
-        ):  # where scripts may do less; from a server they are the same ones
+        if base.startswith("file:"):  # where scripts may do less; from a server they are the same
+            check_access(visit)
             visit.check_dreams()
             visit.check_paths()
             check_steered(visit, PATIENCE)

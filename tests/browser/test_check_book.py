@@ -60,18 +60,21 @@ FAULTS = {
         "<button>Load the network</button><script>document.currentScript.parentElement.motionlab = "
         "{steered: {characters: [{before: {going: {bearing: 0}}}]}}</script></figure>"
     ),
+    "image-alt, 1 times, first at img": '<img src="data:,">',
     "scene 1 did not start": scene("The script of this scene is missing beside the page."),
     "scene 1 draws nothing": scene("<canvas></canvas>"),
     "scene 1 shows the same picture": scene("<canvas width=50 style='background: black'></canvas>"),
 }
-SEARCH = '<div id="search-results"><li><a href="index.html">found</a></li></div>'
+SEARCH = '<ul id="search-results"><li><a href="index.html">found</a></li></ul>'
 GOOD = {"index": "<p>fine</p>", "search": SEARCH}
 
 
 def write(folder, pages):
     """A tiny book."""
     for name, body in pages.items():
-        html = f"<!doctype html><link rel=icon href=data:,><title>{name}</title>{body}"
+        html = (
+            f"<!doctype html><html lang=en><link rel=icon href=data:,><title>{name}</title>{body}"
+        )
         (folder / f"{name}.html").write_text(html, encoding="utf-8")
 
 

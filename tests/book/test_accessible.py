@@ -1,0 +1,39 @@
+"""What the book mends in the HTML of Sphinx and its themes, for those who hear it."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def accessible():
+    pytest.importorskip("sphinx")
+    path = Path(__file__).parents[2] / "book" / "_ext" / "accessible.py"
+    spec = importlib.util.spec_from_file_location("accessible", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_what_is_heard_is_what_is_seen(accessible):
+    seen = (
+        '<details><summary aria-label="Toggle hidden content">\nShow the code</summary></details>'
+    )
+    assert accessible.rewrite(seen) == "<details><summary>\nShow the code</summary></details>"
+
+
+def test_a_long_signature_becomes_lines_and_other_lists_stay(accessible):
+    one, two = (f'<em class="sig-param"><span>{name}</span></em>' for name in ("fps", "up"))
+    other = "<dl><dt>word</dt><dd>what it means</dd></dl>"
+    body = f"{other}<dt>Motion(\n\n<dl>\n<dd>{one},</dd>\n<dd>{two},</dd>\n</dl>\n\n)</dt>{other}"
+    found = accessible.rewrite(body)
+    assert found.count("<dl>") == 2 and found.count(other) == 2
+    assert f'<span class="parameter">{one},</span>' in found
+    assert f'<span class="parameter">{two},</span>' in found
+
+
+def test_references_are_no_list(accessible):
+    assert accessible.rewrite('<div role="list" class="citation-list">x</div>') == (
+        '<div class="citation-list">x</div>'
+    )
