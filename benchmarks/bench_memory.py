@@ -56,9 +56,7 @@ class Options:
 
 
 def main(options: Options) -> None:
-    path = os.environ.get("CHROMIUM") or shutil.which("chromium")
-    if not path or not Path("/proc/self/smaps_rollup").is_file():
-        raise SystemExit("It takes Chromium (on the PATH, or named by CHROMIUM), and Linux.")
+    path = place_of_chromium()
     scripts = {
         "none": "",
         "older": older_bundle(options.against).read_text(encoding="utf-8"),
@@ -77,6 +75,13 @@ def main(options: Options) -> None:
             report(what, numbers[what])
     if options.save:
         save("bench_memory", {"limit": LIMIT, **numbers})
+
+
+def place_of_chromium() -> str:
+    path = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    if not path or not Path("/proc/self/smaps_rollup").is_file():
+        raise SystemExit("It takes Chromium (on the PATH, or named by CHROMIUM), and Linux.")
+    return path
 
 
 def older_bundle(tree: Path) -> Path:
@@ -125,8 +130,11 @@ def as_it_was(text: str) -> str:
     return FIGURES.sub(written, text)
 
 
-def memory(path: str, page_file: Path) -> dict[str, float]:
-    """MB of Chromium with a page: when it has just opened, and a while after it was read to its end."""
+def memory(path: str, page_file: Path, read: bool = True, drawn: str = DRAWN) -> dict[str, float]:
+    """MB of Chromium with a page: when it has just opened, and a while after it was read to its end.
+
+    drawn : what is true in the page once it has opened.
+    """
     from playwright.sync_api import sync_playwright
 
     found = {}
@@ -136,21 +144,27 @@ def memory(path: str, page_file: Path) -> dict[str, float]:
         window = browser.new_context(viewport={"width": 1280, "height": 900}, offline=True)
         page = window.new_page()
         page.goto(page_file.as_uri(), timeout=120_000)
-        page.wait_for_function(DRAWN, timeout=120_000)
+        page.wait_for_function(drawn, timeout=120_000)
         page.wait_for_timeout(PLAYS)
         devtools = window.new_cdp_session(page)
         found["opened"] = settled(page, devtools, before)
-        figures = page.locator(SEEN)
-        for number in range(figures.count()):
-            figures.nth(number).scroll_into_view_if_needed()
-            page.wait_for_timeout(500)
-            page.wait_for_function(DRAWN, timeout=120_000)
-            page.wait_for_timeout(500)
-        page.evaluate("scrollTo(0, document.body.scrollHeight)")
-        page.wait_for_timeout(REST)
-        found["read"] = settled(page, devtools, before)
+        if read:
+            to_its_end(page)
+            found["read"] = settled(page, devtools, before)
         browser.close()
     return found
+
+
+def to_its_end(page) -> None:
+    """Every figure is shown for a moment; then nobody does anything for a while."""
+    figures = page.locator(SEEN)
+    for number in range(figures.count()):
+        figures.nth(number).scroll_into_view_if_needed()
+        page.wait_for_timeout(500)
+        page.wait_for_function(DRAWN, timeout=120_000)
+        page.wait_for_timeout(500)
+    page.evaluate("scrollTo(0, document.body.scrollHeight)")
+    page.wait_for_timeout(REST)
 
 
 def settled(page, devtools, before: set[int]) -> float:
