@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     }
     for run in runs:
         if not run.done:
-            run.train(data, MODEL)
+            run.train(data.matching(ships.encoding), MODEL)  # it knows no contacts
         model = motionlab.load(run.folder / "best.safetensors")
         rows[run.row.name] = measured(model, dict(ships.sampling), data, chosen.starts)
     result = {
