@@ -27,6 +27,7 @@ from .commands.options import as_options
 from .commands.prepare import Prepare
 from .commands.reproduce import Reproduce
 from .commands.sample import Sample
+from .commands.study import StudyCommand
 from .commands.train import Train
 from .errors import MotionLabError
 
@@ -177,6 +178,7 @@ COMMANDS = (
     | Annotated[Design, subcommand("design")]
     | Annotated[Export, subcommand("export")]
     | Annotated[Reproduce, subcommand("reproduce")]
+    | Annotated[StudyCommand, subcommand("study")]
     | Annotated[Version, subcommand("version")]
 )
 
