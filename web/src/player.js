@@ -135,6 +135,7 @@ export class Player {
     this.canvas.remove();
     if (this.still) this.view.append(Object.assign(new Image(), { src: this.still, alt: "Still picture of the motion" }));
     this.view.append(note);
+    this.tell("motionlab:missing");
   }
 
   // -- what the page, the widget and the controls call -------------------------------------------

@@ -21,6 +21,7 @@ export class ClipView {
     const payload = { ...content.player, tracks, height, paths: [], trail: [], overlay: false, bare: true };
     this.player = new Player(stage, payload);
     stage.addEventListener("motionlab:ended", () => this.ended());
+    stage.addEventListener("motionlab:missing", () => this.shown());
     this.show();
   }
 
@@ -33,8 +34,7 @@ export class ClipView {
     now.plays += 1;
     player.setFrame(0);
     player.play();
-    this.show();
-    this.changed();
+    this.shown();
   }
 
   /** Whether it may be played: a few times, and in any case until it was seen to its end. */
@@ -43,6 +43,10 @@ export class ClipView {
   ended() {
     if (this.blind) return;
     this.now.seen = true;
+    this.shown();
+  }
+
+  shown() {
     this.show();
     this.changed();
   }
