@@ -19,6 +19,7 @@ from tyro.conf import DisallowNone, OmitSubcommandPrefixes, Positional, arg, sub
 from .commands.clean import Clean
 from .commands.convert import Convert, Retarget
 from .commands.design import Design
+from .commands.doctor import Doctor
 from .commands.evaluate import Evaluate
 from .commands.export import Export
 from .commands.info import Info
@@ -179,6 +180,7 @@ COMMANDS = (
     | Annotated[Export, subcommand("export")]
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[StudyCommand, subcommand("study")]
+    | Annotated[Doctor, subcommand("doctor")]
     | Annotated[Version, subcommand("version")]
 )
 
