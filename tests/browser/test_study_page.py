@@ -34,7 +34,8 @@ def studies(tmp_path_factory):
     found = {}
     for design in ("ratings", "pairs"):
         built = build(motions, design=design, checks=1, replays=1, contact="a@b.example")
-        (folder / f"{design}.html").write_text(study_page(built), encoding="utf-8")
+        page = study_page(built, reveal=design == "pairs")
+        (folder / f"{design}.html").write_text(page, encoding="utf-8")
         found[design] = built.study
     return folder, found
 
@@ -168,7 +169,13 @@ def test_pairs_on_a_phone_by_touch(visit, studies, tmp_path):
         page.get_by_role("button", name="Next").tap()
     answers, out = read_answers(save(page, tmp_path / "answers").parent, study)
     assert not out and answers[0].order == 1
-    assert sorted(answers[0].values[item.id] for item in study.items if item.clips) == [0, 1]
+    values = {item: answers[0].values[item.id] for item in study.items if item.clips}
+    assert sorted(values.values()) == [0, 1]
+    # its own analysis is that of the library: half a win for each, and one for the clip on the left
+    left = next(study.sides(1, item)[0] for item, value in values.items() if value == 1)
+    winner = study.method_of()[left]
+    rows = [row.inner_text().split() for row in page.locator("tbody tr").all()]
+    assert rows[0] == [winner, "75", "%"] and rows[1][1:] == ["25", "%"]
 
 
 def test_where_storage_is_refused_the_window_keeps_answers_and_it_is_told(visit, browser, folder):

@@ -58,6 +58,12 @@ def test_the_page_does_not_tell_who_made_what(rated):
     assert methods != sorted(methods) and "http" not in content
 
 
+def test_a_page_that_reveals_knows_whose_clips_are_whose(rated):
+    page = study_page(rated, reveal=True)
+    assert '"method":"mocap"' in page and '"gait":"walk"' in page
+    assert "key" not in rated.content
+
+
 def test_the_same_settings_make_the_same_study_and_anything_else_another(rated):
     again = build(sources(), seed=3)
     assert again.study == rated.study and again.content == rated.content

@@ -47,6 +47,9 @@ class Build(Taken):
     """How often a clip may be seen again."""
     checks: int = 2
     """Items that ask for one answer, and tell who does not look."""
+    reveal: bool = False
+    """Show raters at the end what their own answers say; then the page's source tells whose clip is
+    whose, so not for a study that is to count."""
     seed: int = 0
     """Start of all chance: which clips, and in which orders."""
     force: bool = False
@@ -72,7 +75,7 @@ class Build(Taken):
         )  # fmt: skip
         for note in made.notes:
             print(f"note: {note}")
-        page, study = study_page(made), made.study
+        page, study = study_page(made, reveal=self.reveal), made.study
         _write(key, study.to_json())
         _write(self.out, page)
         print(

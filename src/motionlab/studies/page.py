@@ -9,10 +9,18 @@ from ..viewer.live.whole_page import whole_page
 from .build import Built
 
 
-def study_figure(built: Built) -> PageFigure:
-    """The study as a figure of a page that has the player's script, as the book's pages have."""
+def study_figure(built: Built, *, reveal: bool = False) -> PageFigure:
+    """The study as a figure of a page that has the player's script, as the book's pages have.
+
+    reveal : at the end raters see what their own answers say of each method. Then the page knows
+        which clip is whose, and who looks into its source sees it, too.
+    """
+    content = built.content
+    if reveal:
+        whose = {clip.id: {"method": clip.method, "gait": clip.gait} for clip in built.study.clips}
+        content = {**content, "key": whose}
     # "</script>" inside a string would end the element: escape every "<".
-    data = json.dumps(built.content, separators=(",", ":")).replace("<", "\\u003c")
+    data = json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
     return PageFigure(
         '<figure class="motionlab-study">'
         f'<script type="application/json">{data}</script>'
@@ -21,6 +29,6 @@ def study_figure(built: Built) -> PageFigure:
     )
 
 
-def study_page(built: Built) -> str:
+def study_page(built: Built, *, reveal: bool = False) -> str:
     """The HTML of the whole page."""
-    return whole_page(study_figure(built), built.study.title)
+    return whole_page(study_figure(built, reveal=reveal), built.study.title)

@@ -114,6 +114,7 @@ export class StudyFigure {
   finish() {
     end(this.place, this.content, {
       saved: () => this.state.saved === this.at,
+      state: this.state,
       text: answersText(this.study, this.state),
       save: () => this.save(),
       anew: () => {

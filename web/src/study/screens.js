@@ -1,6 +1,7 @@
 // What a rater reads and presses, screen by screen.
 import { ClipView } from "./clip.js";
 import { make } from "./dom.js";
+import { ownAnswers } from "./own.js";
 
 const RATINGS = {
   question: "How realistic is this motion?",
@@ -27,7 +28,7 @@ const kept = (place) => make("p", { className: `ml-kept${place === "local" ? "" 
 const heading = (text) => make("h2", { tabIndex: -1 }, text);
 
 /** What it is about, and whether the rater wants to. `begin(number)`, `goOn(text)`. */
-export function consent(host, { study, contact, rules }, place, begin, goOn) {
+export function consent(host, { study, contact, rules, key }, place, begin, goOn) {
   const agree = make("input", { type: "checkbox", id: "ml-agree" });
   const number = make("input", { type: "number", min: 0, step: 1, id: "ml-number", className: "ml-choice" });
   const start = make("button", { type: "button", className: "ml-load", disabled: true }, "Begin");
@@ -48,7 +49,7 @@ export function consent(host, { study, contact, rules }, place, begin, goOn) {
   host.append(
     heading("Before you begin"),
     make("p", {}, `You will see ${items} ${study.design === "pairs" ? "pairs of short motions" : "short motions"} of a figure, and say of each how it looks to you. It takes about ${minutes} minutes. There is no right or wrong: what you see counts.`),
-    make("p", {}, "Some motions were recorded from people, others were made by programs. You are not told which."),
+    make("p", {}, `Some motions were recorded from people, others were made by programs. You are not told which${key ? " before the end" : ""}.`),
     make("p", {}, "Your answers stay on this device. This page asks for no name, and sends nothing: at the end you save a file, and whether you hand it on is up to you. It holds your answers, their times, how often you played each motion, and a random number in place of a name. You can stop at any time."),
     kept(place),
     ...(contact ? [make("p", {}, `Questions, and the file, go to: ${contact}`)] : []),
@@ -132,7 +133,8 @@ export class Question {
 }
 
 /** The end: save, or let another person begin. */
-export function end(host, { contact }, { saved, text, save, anew }) {
+export function end(host, content, { saved, state, text, save, anew }) {
+  const { contact, key } = content;
   const again = make("button", { type: "button", className: "ml-kind" }, "Another person begins");
   const sure = make("p", { role: "alert", className: "ml-warn" });
   again.addEventListener("click", () => {
@@ -145,6 +147,7 @@ export function end(host, { contact }, { saved, text, save, anew }) {
     make("p", {}, "Save your answers now: until then they are in this browser alone."),
     make("div", { className: "ml-buttons" }, make("button", { type: "button", className: "ml-load", onclick: save }, "Save my answers"), again),
     sure,
+    ...(key ? [ownAnswers(content, state)] : []),
     make("p", {}, contact ? `Please send the file to: ${contact}` : "Please hand the file to who asked you to take part."),
     make("details", { className: "ml-more" }, make("summary", {}, "No file can be saved here"), make("p", {}, "Copy this text and send it instead:"), whole),
   );
