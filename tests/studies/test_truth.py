@@ -7,9 +7,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from motionlab.studies.order import orders
 from motionlab.studies.pairs import bradley_terry
 from motionlab.studies.ratings import by_rater, holm, over_raters, signed_rank
-from motionlab.studies.simulate import choices, expected, ratings
+from motionlab.studies.simulate import choices, expected, in_order, ratings
 
 FELT = np.array([2.6, 3.0, 3.4, 3.8])
 METHOD = np.repeat(np.arange(4), 7)  # seven clips of each of four methods
@@ -79,3 +80,36 @@ def test_where_all_are_as_strong_five_in_a_hundred_are_told_apart():
     compared = [judged(np.zeros(4), rng)[1] for _ in range(300)]
     assert np.mean([[one.p < 0.05 for one in each] for each in compared]) == pytest.approx(0.05, abs=0.02)  # fmt: skip
     assert np.mean([min(one.holm for one in each) < 0.05 for each in compared]) <= 0.07
+
+
+def order_errors(sequence, **moved) -> np.ndarray:
+    """How far means (methods,) of very many raters lie from those of a study without any such thing."""
+    felt, rng = FELT[METHOD], np.random.default_rng(5)
+    calm = in_order(felt, sequence, rng).astype(float)
+    found = in_order(felt, sequence, rng, **moved).astype(float)
+    return by_rater(found, METHOD, 4).mean(0) - by_rater(calm, METHOD, 4).mean(0)
+
+
+def test_a_fixed_order_favours_who_comes_first_and_balanced_ones_do_not():
+    """Tired raters: what comes late loses. In balanced orders all lose alike, so that none is favoured."""
+    raters = 4000
+    fixed = np.tile(np.arange(28), (raters, 1))  # method after method
+    rows = orders([np.arange(28).reshape(4, 7).T], [], seed=0)
+    balanced = np.array([rows[i % len(rows)] for i in range(raters)])
+    assert np.ptp(order_errors(fixed, tired=1.0)) > 0.5
+    assert np.ptp(order_errors(balanced, tired=1.0)) < 0.12  # scales end, so not quite alike
+    assert np.ptp(order_errors(balanced)) < 0.06
+
+
+def test_after_a_bad_clip_one_looks_good():
+    pairs = np.array([[0, 27], [27, 0]] * 3000)
+    felt = np.where(np.arange(28) == 0, 1.5, 3.5)
+    order = np.concatenate([pairs, np.tile(np.arange(1, 27), (6000, 1))], axis=1)
+    found = in_order(felt, order, np.random.default_rng(0), contrast=0.5)
+    assert found[0::2, 27].mean() > found[1::2, 27].mean() + 0.3
+
+
+def test_who_knows_the_name_rates_the_name():
+    hoped = np.where(METHOD == 3, 0.8, 0.0)
+    found = order_errors(np.tile(np.arange(28), (2000, 1)), hoped=hoped)
+    assert found[3] > 0.5 and np.abs(found[:3]).max() < 0.06

@@ -144,3 +144,32 @@ def differences_of(felt: Mapping[str, float]) -> dict[tuple[str, str], float]:
     """The truth of every two methods compared: of ratings, in points."""
     true = {method: float(expected(np.array(value))) for method, value in felt.items()}
     return {(a, b): true[a] - true[b] for a, b in combinations(sorted(true), 2)}
+
+
+def in_order(
+    felt: np.ndarray,
+    orders: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    contrast: float = 0.0,
+    tired: float = 0.0,
+    hoped: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """Ratings (raters, clips) from 1 to 5 by people whom the order moves, as it does move people.
+
+    Parameters
+    ----------
+    felt : (clips,) how good each is, on the scale of ratings.
+    orders : (raters, clips) numbers of the clips as each rater sees them.
+    contrast : share of how much better than the mean the clip before was, that is taken off.
+    tired : points that are taken off the last clip, and of those between a part.
+    hoped : (clips,) points added because a rater knows who made it: 0 if the study is blind.
+    """
+    raters, clips = orders.shape
+    before = np.concatenate([np.zeros((raters, 1)), felt[orders[:, :-1]] - felt.mean()], axis=1)
+    late = np.linspace(0, 1, clips) if clips > 1 else np.zeros(1)
+    moved = np.empty((raters, clips))
+    np.put_along_axis(moved, orders, -contrast * before - tired * late, axis=1)
+    mild = rng.normal(0, RATER, (raters, 1))
+    seen = felt + hoped + moved + mild + rng.normal(0, NOISE, (raters, clips))
+    return 1 + np.searchsorted(CUTS, seen)
