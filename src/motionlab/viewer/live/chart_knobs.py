@@ -21,7 +21,7 @@ from .figure import PageFigure
 from .knobs import MOST, check_knobs, page_input
 from .knobs_kernel import knob_field
 
-WIDE, ROW, LEFT = 620, 34, 110  # of the chart, in its own units
+WIDE, ROW, LEFT = 440, 34, 84  # of the chart, in its own units
 _PAGE = """
 <figure class="motionlab-chart" id="{key}" style="margin:1rem 0">
 <style>
@@ -129,8 +129,8 @@ def chart(bars: Sequence[Bar], ends: tuple[float, float], unit: str) -> str:
     told = "; ".join(f"{b.name} {b.value:.2f}" for b in bars)
     return (
         f'<svg viewBox="0 0 {WIDE} {deep + 38}" role="img" aria-label="{html.escape(told, quote=True)}" '
-        f'style="width:100%;max-width:{WIDE}px;height:auto;display:block;'
-        'font:13px system-ui,sans-serif;fill:currentColor">'
+        f'style="width:100%;max-width:{1.2 * WIDE:.0f}px;height:auto;display:block;'
+        'font:14px system-ui,sans-serif;fill:currentColor">'
         f'{"".join(parts)}<text x="{across((low + high) / 2):.1f}" y="{deep + 34}" '
         f'text-anchor="middle">{html.escape(unit)}</text></svg>'
     )
