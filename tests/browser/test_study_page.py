@@ -230,6 +230,46 @@ def test_of_two_windows_one_goes_on_and_the_other_says_so(browser, folder):
     window.close()
 
 
+def test_steps_back_and_windows_that_die_lose_nothing(browser, folder):
+    window = browser.new_context(offline=True)
+    url = (folder / "ratings.html").as_uri()
+    page = check_book.Visit(window, url).page
+    begin(page)
+    answer(page, "3")
+    answer(page, "2")
+    page.goto("about:blank")
+    page.go_back()
+    page.get_by_role("heading", name="2 of 5").wait_for()
+    answer(page, "5")
+    page.close(run_before_unload=False)
+    page = check_book.Visit(window, url).page
+    page.get_by_role("heading", name="3 of 5").wait_for()
+    assert [one["value"] for one in state(page, "state.answers")] == [2, 5]
+    window.close()
+
+
+def test_a_page_that_was_told_nothing_overwrites_nothing(browser, folder):
+    """As one that comes back by a step back, after another went on."""
+    window = browser.new_context(offline=True)
+    page = check_book.Visit(window, (folder / "ratings.html").as_uri()).page
+    begin(page)
+    answer(page, "3")
+    page.evaluate(f"""() => {{
+      const store = {STATE}.store;
+      const kept = {{ ...store.read(), token: "another window" }};
+      const item = {STATE}.study.items[{STATE}.sequence[0]].id;
+      kept.answers.push({{ item, value: 4, plays: 1, shown: 1, answered: 2 }});
+      kept.now = null;
+      localStorage.setItem(store.key, JSON.stringify(kept));
+    }}""")
+    page.keyboard.press(" ")  # which keeps how often it was played
+    page.get_by_role("heading", name="open in another window").wait_for()
+    page.get_by_role("button", name="Go on here").click()
+    page.get_by_role("heading", name="2 of 5").wait_for()
+    assert state(page, "state.answers[0].value") == 4
+    window.close()
+
+
 def test_without_webgl_nobody_judges_what_is_not_seen(browser, folder):
     window = browser.new_context(offline=True)
     window.add_init_script(NO_WEBGL)

@@ -54,7 +54,7 @@ export class ClipView {
   show() {
     const { now, player } = this;
     const left = Math.max(this.most - now.plays, 0);
-    this.button.disabled = player.playing || !this.may;
+    this.button.disabled = !player.playing && !this.may; // while it plays the focus shall stay
     this.button.textContent = player.playing ? "Playing" : now.plays === 0 || !now.seen ? "Play" : `Play again (${left} left)`;
   }
 

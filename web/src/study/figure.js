@@ -23,7 +23,16 @@ export class StudyFigure {
     this.store = new Store(this.study.hash, () => this.taken());
     document.addEventListener("keydown", (event) => this.question?.key(event));
     this.state = this.fits(this.store.read()) ?? this.fresh();
-    if (this.state.agreed) this.keep(); // which tells a window that has it open that this one goes on
+    if (this.state.agreed) this.keep(true); // which tells a window that has it open that this one goes on
+    this.show();
+    globalThis.addEventListener("pageshow", ({ persisted }) => persisted && this.resume());
+  }
+
+  /** Go on where the study is by now, whichever window brought it there. */
+  resume() {
+    this.elsewhere = false;
+    this.state = this.fits(this.store.read()) ?? this.fresh();
+    if (this.state.agreed) this.keep(true);
     this.show();
   }
 
@@ -37,9 +46,10 @@ export class StudyFigure {
     return whole ? state : null;
   }
 
-  keep() {
+  /** Keep the state; whether it is kept where it was before. */
+  keep(takeOver = false) {
     const before = this.store.place;
-    this.store.write(this.state);
+    this.store.write(this.state, takeOver);
     return before === this.store.place;
   }
 
@@ -48,6 +58,7 @@ export class StudyFigure {
   get at() { return this.state.answers.length; }
 
   show() {
+    if (this.elsewhere) return;
     this.question?.dispose();
     this.question = null;
     this.place.replaceChildren();
@@ -60,18 +71,20 @@ export class StudyFigure {
   }
 
   begin(number) {
+    if (this.fits(this.store.read())?.agreed) return this.resume(); // begun in another window meanwhile
     const { orders } = this.study;
     this.state.order = number === null ? crypto.getRandomValues(new Uint32Array(1))[0] % orders.length : number % orders.length;
     this.state.agreed = Date.now();
-    this.keep();
+    this.keep(true);
     this.show();
   }
 
   goOn(text) {
     const found = stateFrom(this.study, text);
     if (!this.study.orders[found.order]) throw new Error("this file is damaged.");
+    if (this.fits(this.store.read())?.agreed) return this.resume();
     this.state = { ...this.fresh(), ...found, practised: true };
-    this.keep();
+    this.keep(true);
     this.show();
   }
 
@@ -127,14 +140,11 @@ export class StudyFigure {
 
   /** Another window of this browser goes on with the study: nothing is answered here until it is asked for. */
   taken() {
+    this.elsewhere = true;
     this.question?.dispose();
     this.question = null;
     const here = make("button", { type: "button", className: "ml-load" }, "Go on here");
-    here.addEventListener("click", () => {
-      this.state = this.fits(this.store.read()) ?? this.fresh();
-      this.keep();
-      this.show();
-    });
+    here.addEventListener("click", () => this.resume());
     this.place.replaceChildren(
       make("h2", { tabIndex: -1 }, "This study is open in another window"),
       make("p", {}, "Nothing is lost: go on there, or here, where you are by now."),

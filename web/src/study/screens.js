@@ -115,7 +115,7 @@ export class Question {
     this.button.disabled = !now.seen || now.value == null;
     this.hint.textContent = this.clip?.blind
       ? "This browser shows no moving figures (it has no WebGL): please take another one."
-      : now.seen ? "" : "Watch it to its end; then you can answer.";
+      : now.seen ? (now.value == null ? "Now you can answer." : "") : "Watch it to its end; then you can answer.";
   }
 
   key(event) {

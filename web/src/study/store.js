@@ -5,6 +5,7 @@ export class Store {
   /** `key` names the study. `lost` is called when another window goes on with it. */
   constructor(key, lost) {
     this.key = `motionlab-study-${key}`;
+    this.lost = lost;
     this.token = Math.random().toString(36).slice(2);
     this.place = this.find();
     globalThis.addEventListener("storage", (event) => {
@@ -32,7 +33,10 @@ export class Store {
     }
   }
 
-  write(state) {
+  /** Keep a state, unless another window has gone on meanwhile: a page that comes back by a step back was told nothing. */
+  write(state, takeOver) {
+    const other = this.place === "local" && this.read()?.token;
+    if (!takeOver && other && other !== this.token) return this.lost();
     const text = JSON.stringify({ ...state, token: this.token });
     try {
       if (this.place === "local") return localStorage.setItem(this.key, text);
