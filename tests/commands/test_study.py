@@ -97,6 +97,15 @@ def test_bad_and_loose_files_are_named(clips, capsys):
     assert "such as loose.bvh" in capsys.readouterr().err
 
 
+def test_some_files_are_read_otherwise(clips, capsys):
+    (clips / "how.toml").write_text('["RNN/*"]\nfps = 15\n')
+    build = ["study", "build", "clips", "--by-file", "how.toml", "--out", "s.html"]
+    assert main(build) == 0
+    assert "rates differ (15, 30 fps)" in capsys.readouterr().out
+    assert main(["study", "build", "clips/RNN", "clips/mocap", *build[3:], "--force"]) == 1
+    assert "--by-file: is of one folder's files" in capsys.readouterr().err
+
+
 def test_a_study_that_was_given_out_is_not_overwritten(clips, capsys):
     build = ["study", "build", "clips", "--out", "study.html"]
     assert main(build) == 0

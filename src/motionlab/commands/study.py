@@ -12,7 +12,8 @@ from tyro.conf import Positional, arg, subcommand
 from ..datasets.report import Report
 from ..errors import MotionFileError, MotionLabError, StudyError
 from ..io.motion_file import is_motion, read_motion
-from .choices import chosen
+from ..io.readings import Readings
+from .choices import chosen, shown_first
 from .clips import files_of
 from .folder import Taken, check_there
 from .options import as_options
@@ -20,6 +21,10 @@ from .options import as_options
 DESIGNS = ("ratings", "pairs")
 
 
+@shown_first(
+    "paths", "out", "design", "title", "contact", "clips", "seconds", "replays", "checks", "reveal",
+    "seed", "force",
+)  # fmt: skip
 @dataclass(kw_only=True)
 class Build(Taken):
     """A page on which people judge motions, from disk and offline, and the key to it.
@@ -90,10 +95,16 @@ class Build(Taken):
         from ..studies.build import Source
 
         found = list(_files(self.paths))
-        report, how, sources = Report(Path("."), len(found)), self.how(), []
+        said = self.answers()
+        if said and len(self.paths) > 1:
+            raise StudyError(
+                "--by-file: is of one folder's files; name one that holds all methods."
+            )
+        how = Readings(self.paths[0], [file for *_, file in found], self.how(), said)
+        report, sources = Report(Path("."), len(found)), []
         for method, gait, file in found:
             with report.of(file, file.stem):
-                motion, doubts = read_motion(file, how)
+                motion, doubts = read_motion(file, how.of(file))
                 report.doubt(file, doubts)
                 sources.append(Source(motion, method, gait, file.as_posix()))
         for note in report.notes():
