@@ -66,7 +66,7 @@ def test_signed_ranks_as_published_and_by_hand():
     up = np.arange(1, 7.0)[:, None]
     assert signed_rank(up)[0] == pytest.approx(2 / 2**6)  # all six of one sign
     assert signed_rank(np.zeros((5, 1)))[0] == 1
-    # with ties, Conover's normal: W = 1.5 of 10.5 for three of four, variance 30/4 - 2 * (8 - 2) / 48
+    # with ties: mean ranks, and the normal with half of their sum and a quarter of their squares
     tied = np.array([[1.0], [1], [-1], [2], [2]])
     ranks, negative = np.array([2, 2, 2, 4.5, 4.5]), 2.0
     spread = np.sqrt((ranks**2).sum() / 4)

@@ -1,4 +1,8 @@
-"""What raters saved, read and checked: what can't be counted is named with the reason, and left out."""
+"""What raters saved, read and checked: what can't be counted is named with the reason, and left out.
+
+The checksum tells what was damaged or edited in passing. It is no seal: who knows how it is made can
+make another, so take files from raters themselves.
+"""
 
 from __future__ import annotations
 
