@@ -155,7 +155,7 @@ def test_the_line_of_imports_names_every_room():
     outside = {"", "__main__", "errors", "version"}  # the package itself, and what all may use
     assert {m for m in MODULES if group_of(m) is None} == outside
     rooms = {m.split(".")[0] for m in MODULES}
-    promised = {"losses", "studies"}  # rooms of chapters to come
+    promised = {"losses"}  # rooms of chapters to come
     elsewhere = {"experiments", "notebooks"}
     assert set().union(*GROUPS) - promised - elsewhere <= rooms
 
@@ -265,10 +265,13 @@ def test_notebook_is_stored_without_outputs(path):
         assert "".join(cell["source"]).count("\n") < 25 or cell["cell_type"] != "code"
 
 
+DRAFTS = {"11_would_you_believe_it"}  # chapters that are not whole yet, and in no book
+
+
 def test_every_chapter_is_in_the_table_of_contents():
     toc = (ROOT / "book" / "_toc.yml").read_text(encoding="utf-8")
     for path in (ROOT / "notebooks").glob("*.ipynb"):
-        assert f"notebooks/{path.stem}" in toc
+        assert (f"notebooks/{path.stem}" in toc) != (path.stem in DRAFTS)
 
 
 @pytest.mark.parametrize("url", ["", "https://example.org/motionlab"])

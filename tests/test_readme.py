@@ -137,6 +137,24 @@ def test_the_commands_for_your_own_clips_run(tmp_path, monkeypatch, capsys):
     assert {path.name for path in (tmp_path / "for_the_engine").iterdir()} == {"a.glb", "b.glb"}
 
 
+def test_the_commands_of_a_study_run(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("statsmodels")
+    from motionlab import write_bvh
+    from motionlab.__main__ import main
+    from motionlab.datasets import gaits
+
+    section = README.partition("## People judge")[2].partition("\n## ")[0]
+    commands = re.findall(r"^motionlab (.*?)(?:\s+#.*)?$", section, re.MULTILINE)
+    assert [command.split()[1] for command in commands] == ["build", "simulate", "analyse"]
+    monkeypatch.chdir(tmp_path)
+    for seed, name in enumerate(("mocap/walk", "RNN/walk")):
+        (tmp_path / "my_study" / name).mkdir(parents=True)
+        write_bvh(gaits.make(seconds=1, seed=seed), f"my_study/{name}/1.bvh")
+    for command in commands:
+        assert main(command.split()) == 0, command
+    assert "To tell two methods 0.3 points apart" in capsys.readouterr().out
+
+
 def test_what_the_readme_links_to_is_there():
     for target in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (ROOT / target).exists(), target

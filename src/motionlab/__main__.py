@@ -19,6 +19,7 @@ from tyro.conf import DisallowNone, OmitSubcommandPrefixes, Positional, arg, sub
 from .commands.clean import Clean
 from .commands.convert import Convert, Retarget
 from .commands.design import Design
+from .commands.doctor import Doctor
 from .commands.evaluate import Evaluate
 from .commands.export import Export
 from .commands.info import Info
@@ -27,6 +28,7 @@ from .commands.options import as_options
 from .commands.prepare import Prepare
 from .commands.reproduce import Reproduce
 from .commands.sample import Sample
+from .commands.study import StudyCommand
 from .commands.train import Train
 from .errors import MotionLabError
 
@@ -177,6 +179,8 @@ COMMANDS = (
     | Annotated[Design, subcommand("design")]
     | Annotated[Export, subcommand("export")]
     | Annotated[Reproduce, subcommand("reproduce")]
+    | Annotated[StudyCommand, subcommand("study")]
+    | Annotated[Doctor, subcommand("doctor")]
     | Annotated[Version, subcommand("version")]
 )
 

@@ -75,3 +75,7 @@ class WayError(MotionLabError):
 
 class SolverError(MotionLabError):
     """A search was asked for what no motion can do, or what a model can't tell."""
+
+
+class StudyError(MotionLabError):
+    """A study that can't be built, or answers that can't be analysed."""

@@ -15,8 +15,6 @@ player and the first scene of a page are enough. It waits as long as a busy mach
 import functools
 import http.server
 import io
-import os
-import shutil
 import sys
 import threading
 import time
@@ -30,10 +28,11 @@ from check_steered import check_steered
 from PIL import Image
 from playwright.sync_api import BrowserContext, Page, TimeoutError, sync_playwright
 
+from motionlab.commands.doctor import find_chromium
+
 PAGE_BYTES = 2.5e6  # a page's own weight: its HTML and what only it loads
 PATIENCE = 20_000  # milliseconds for a formula, a player or a search to appear
 DESKTOP, PHONE = (1280, 900), (390, 844)
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
 FLAGS = [  # WebGL in software: the machine that checks may have no graphics card
     "--no-sandbox",
     "--use-gl=angle",
@@ -306,7 +305,7 @@ def local_server(folder: Path):
 
 
 def chromium() -> str:
-    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    found = find_chromium()
     if not found:
         sys.exit(
             "No Chromium found. Install it (Debian: apt-get install chromium) or set CHROMIUM."

@@ -2,7 +2,7 @@
 
 export class Clock {
   constructor(frames, fps) {
-    Object.assign(this, { frames, fps, time: 0, playing: false, speed: 1, growing: false });
+    Object.assign(this, { frames, fps, time: 0, playing: false, speed: 1, growing: false, once: false });
   }
 
   get frame() {
@@ -15,11 +15,13 @@ export class Clock {
     return this.frame;
   }
 
-  /** Let `seconds` pass; past the end it starts again, unless there are more frames to come. */
+  /** Let `seconds` pass; past the end it starts again, unless there are more frames to come, or it plays `once`. */
   tick(seconds) {
     if (!this.playing || this.frames < 2) return false;
     this.time += seconds * this.fps * this.speed;
-    if (this.time > this.frames - 1) this.time = this.growing ? this.frames - 1 : this.time % (this.frames - 1);
+    if (this.time <= this.frames - 1) return true;
+    this.playing &&= !this.once;
+    this.time = this.growing || this.once ? this.frames - 1 : this.time % (this.frames - 1);
     return true;
   }
 }

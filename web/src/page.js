@@ -3,8 +3,9 @@ import { PathFigure } from "./drawing/figure.js";
 import { Dream } from "./network/dream.js";
 import { Player } from "./player.js";
 import { SteerFigure } from "./steering/figure.js";
+import { StudyFigure } from "./study/figure.js";
 
-const KINDS = { "motionlab-player": Player, "motionlab-dream": Dream, "motionlab-path": PathFigure, "motionlab-steer": SteerFigure };
+const KINDS = { "motionlab-player": Player, "motionlab-dream": Dream, "motionlab-path": PathFigure, "motionlab-steer": SteerFigure, "motionlab-study": StudyFigure };
 
 function mount(figure, Kind) {
   const data = figure.querySelector('script[type="application/json"]');

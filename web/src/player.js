@@ -29,6 +29,7 @@ export class Player {
     this.payload = payload;
     this.clock = clock;
     this.clock.speed = payload.speed ?? 1;
+    this.clock.once = this.bare = payload.bare ?? false; // plays once, by what stands around it alone
     this.follow = payload.follow ?? true;
     this.overlay = payload.overlay ?? false;
     this.chosen = payload.chosen ?? 0; // the track that is seen, if one is at a time
@@ -54,8 +55,8 @@ export class Player {
     const names = this.tracks.map((track) => track.label).filter(Boolean).join(", ") || "a motion";
     this.canvas.setAttribute(
       "aria-label",
-      `Moving figure: ${names}, ${duration}. Space plays and pauses, arrow keys ` +
-        "step, Home and End jump, Shift with arrows turns the view, plus and minus zoom, F follows, R resets.",
+      `Moving figure: ${names}, ${duration}. ${this.bare ? "" : "Space plays and pauses, arrow keys step, Home and End jump, "}` +
+        `Shift with arrows turns the view, plus and minus zoom${this.bare ? "" : ", F follows, R resets"}.`,
     );
     this.labels = document.createElement("div");
     this.labels.className = "ml-labels";
@@ -63,7 +64,7 @@ export class Player {
     this.view.append(this.canvas, this.labels);
     if (this.magnified !== 1) this.view.append(this.sayScale());
     this.bar = new Bar(this, frames, fps, this.several);
-    this.host.append(this.view, this.bar.element);
+    this.host.append(this.view, ...(this.bare ? [] : [this.bar.element]));
     this.orbit = new Orbit(this.canvas, !REDUCED?.matches);
     this.orbit.controls.addEventListener("change", () => { this.dirty = true; });
     this.view.addEventListener("keydown", (event) => this.key(event));
@@ -134,6 +135,7 @@ export class Player {
     this.canvas.remove();
     if (this.still) this.view.append(Object.assign(new Image(), { src: this.still, alt: "Still picture of the motion" }));
     this.view.append(note);
+    this.tell("motionlab:missing");
   }
 
   // -- what the page, the widget and the controls call -------------------------------------------
@@ -194,6 +196,7 @@ export class Player {
     if (this.clock.tick(seconds)) {
       this.economise(seconds);
       this.refresh();
+      if (!this.playing) this.tell("motionlab:ended");
     }
     if (this.orbit.controls.update()) this.dirty = true;
     if (this.stage?.gone && this.casts) {
@@ -237,7 +240,8 @@ export class Player {
       "-": () => this.orbit.turn(0, 0, 1.15),
     };
     const turns = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
-    const action = event.shiftKey && turns[event.key] ? () => this.orbit.turn(...turns[event.key]) : actions[event.key];
+    const key = this.bare && !"+-".includes(event.key) ? null : actions[event.key];
+    const action = event.shiftKey && turns[event.key] ? () => this.orbit.turn(...turns[event.key]) : key;
     if (!action) return;
     event.preventDefault();
     event.stopPropagation(); // a notebook has its own meaning for these keys

@@ -92,6 +92,20 @@ def knobs(
     ViewerError : a knob without two rising values, a start that is not among them, more than 60
         settings in a page, or a `make` that gives something else.
     """
+    values, start, called = check_knobs(values, start, labels)
+    look = {"trail": trail, "color": check_color(color), "height": height}
+    if os.environ.get("MOTIONLAB_VIEWER") == "page":
+        return _page(make, values, start, called, caption, **look)
+    shown = lambda wanted: made_of(make, wanted, look["color"])
+    return box(shown, values, start, called, caption, trail, height)
+
+
+def check_knobs(
+    values: Mapping[str, Sequence[float]],
+    start: Mapping[str, float] | None,
+    labels: Mapping[str, str] | None,
+) -> tuple[dict[str, tuple], dict[str, float], dict[str, str]]:
+    """Values, starts and labels of knobs, whole; raises ViewerError."""
     values = {name: tuple(some) for name, some in values.items()}
     start = {name: some[0] for name, some in values.items() if some} | dict(start or {})
     for name, some in values.items():
@@ -102,12 +116,7 @@ def knobs(
             )
     if not values or set(start) != set(values):
         raise ViewerError(f"knobs: values for {list(values)}, start for {list(start)}.")
-    called = {name: (labels or {}).get(name, name) for name in values}
-    look = {"trail": trail, "color": check_color(color), "height": height}
-    if os.environ.get("MOTIONLAB_VIEWER") == "page":
-        return _page(make, values, start, called, caption, **look)
-    shown = lambda wanted: made_of(make, wanted, look["color"])
-    return box(shown, values, start, called, caption, trail, height)
+    return values, start, {name: (labels or {}).get(name, name) for name in values}
 
 
 def _page(make, values, start, called, caption, trail, color, height) -> PageFigure:
@@ -135,7 +144,7 @@ def _page(make, values, start, called, caption, trail, color, height) -> PageFig
         _PAGE.format(
             key=f"knobs-{uuid.uuid4().hex[:8]}",
             player=page_html(content, still_picture(tracks[chosen])),
-            inputs="".join(map(_input, called.values(), values.values(), first, names)),
+            inputs="".join(map(page_input, called.values(), values.values(), first, names)),
             said=html.escape(said),
             made=json.dumps([names, made], separators=(",", ":")).replace("<", "\\u003c"),
             caption=f"<figcaption>{html.escape(caption)}</figcaption>" if caption else "",
@@ -143,7 +152,8 @@ def _page(make, values, start, called, caption, trail, color, height) -> PageFig
     )
 
 
-def _input(label: str, some: Sequence[float], at: int, names: Sequence[str]) -> str:
+def page_input(label: str, some: Sequence[float], at: int, names: Sequence[str]) -> str:
+    """A knob of a page: a box, or a slider over the numbers of its values."""
     if is_box(some):
         ticked = " checked" if at else ""
         return f'<label><input type="checkbox" autocomplete="off"{ticked}> {html.escape(label)}</label>'

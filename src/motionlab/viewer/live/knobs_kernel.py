@@ -27,7 +27,7 @@ def box(
 
     shown : of the knobs' values: a track, its rate, and a line of text.
     """
-    fields = {name: _field(called[name], some, start[name]) for name, some in values.items()}
+    fields = {name: knob_field(called[name], some, start[name]) for name, some in values.items()}
     said = ipywidgets.Label()
 
     def content() -> dict[str, Any]:
@@ -58,7 +58,7 @@ def is_box(some: Sequence[float]) -> bool:
     return all(isinstance(value, bool) for value in some)
 
 
-def _field(label: str, some: Sequence[float], value: float) -> ipywidgets.DOMWidget:
+def knob_field(label: str, some: Sequence[float], value: float) -> ipywidgets.DOMWidget:
     """A box to tick, or a slider, which counts when it is let go."""
     common = {"description": label, "style": STYLE, "layout": LAYOUT}
     if is_box(some):
