@@ -1,5 +1,6 @@
 """Results of the claims S and what their rules say of them."""
 
+from experiments.claims.strnn import RIVALS
 from experiments.strnn.ablations import PAIRS
 
 
@@ -75,9 +76,18 @@ def controlled(rms=4.0, alive=1.0, restored=True, skate=5.0, speed=1500.0, **mor
 
 def foretold(early=1.0, late=1.0, **more):
     times = [f"{ms} ms" for ms in range(80, 561, 80)]
-    rivals = {name: dict.fromkeys(times, 2.0) for name in ("lstm-3lr", "erd", "seq2seq", "6-gram")}
+    rivals = {name: dict.fromkeys(times, 2.0) for name in RIVALS}
     ours = {ms: early if int(ms[:3]) < 320 else late for ms in times}
     return {"split": "test", "rows": rivals | {"Composite_20_20_HY": ours}} | more
+
+
+def ordered(loss=(0.9, 0.9, 0.9), decoded=0.9, **more):
+    row = lambda curve, error: {"seeds": {"0": {
+        "updates": 600, "curve": dict(zip(("200", "400", "600"), curve, strict=True)),
+        "errors": {"decoded": error},
+    }}}  # fmt: skip
+    rows = {"Temporal_20_20_MSE": row(loss, decoded), "forwards": row((1.0, 1.0, 1.0), 1.0)}
+    return {"split": "test", "preset": "table", "rows": rows, "pairs": {}} | more
 
 
 def opens(speed):
@@ -135,6 +145,11 @@ CASES = [
     ("S5", "not", controlled(alive=0.5)),
     ("S5", "open", controlled(split="val")),
     ("S5", "open", controlled(frames=100)),
+    ("S10-backward", "reproduced", ordered()),
+    ("S10-backward", "partly", ordered((0.9, 0.9, 0.99))),
+    ("S10-backward", "partly", ordered(decoded=1.1)),
+    ("S10-backward", "not", ordered((1.1, 0.9, 0.9))),
+    ("S10-backward", "open", ordered(split="val")),
     ("S6", "reproduced", foretold()),
     ("S6", "partly", foretold(early=3.0)),
     ("S6", "not", foretold(late=3.0)),

@@ -8,7 +8,7 @@ from .verdict import NOT, PARTLY, REPRODUCED, Absent, Verdict
 
 STARTS, FRAMES, WINDOWS = 50, 20_000, 512
 CONTROLLED = 1_000  # frames of a run along a path
-RIVALS = ("lstm-3lr", "erd", "seq2seq", "6-gram")
+RIVALS = ("lstm-3lr", "erd", "seq2seq", "crbm", "6-gram", "gpdm")
 SHORT = 10.0  # seconds; a cycle that is shorter is a loop that is seen
 
 
@@ -117,6 +117,20 @@ def s10_noise(limits: dict, *budgets: dict) -> Verdict:
     if none == "better" and steady != "worse":
         return Verdict(REPRODUCED, told)
     return Verdict(PARTLY if "better" in (none, steady) else NOT, told)
+
+
+def s10_backward(limits: dict, found: dict) -> Verdict:
+    found, rows = _rows((found,), ("Temporal_20_20_MSE", "forwards"))
+    both = [rows[name]["seeds"]["0"] for name in ("Temporal_20_20_MSE", "forwards")]
+    numbers = {"updates": _updates(found)}
+    numbers |= {f"validation loss of the other's, after {updates} updates": its / both[1]["curve"][updates]
+                for updates, its in both[0]["curve"].items()}  # fmt: skip
+    losses = [its for name, its in numbers.items() if "loss" in name]
+    said = both[0]["errors"]["decoded"] / both[1]["errors"]["decoded"]
+    numbers["squared error of frames said again, of the other's"] = said
+    if max(*losses, said) <= limits["less"]:
+        return Verdict(REPRODUCED, numbers)
+    return Verdict(PARTLY if max(losses) < 1 else NOT, numbers)
 
 
 def s10_narrow(limits: dict, *budgets: dict) -> Verdict:
@@ -256,6 +270,8 @@ def s6(limits: dict, found: dict) -> Verdict:
     if found["split"] != "test":
         raise Absent("the result there is not of test clips")
     rows = found["rows"]
+    if missing := [name for name in RIVALS if name not in rows]:
+        raise Absent(f"the result there has no {', '.join(missing)}")
     ours, rivals = rows["Composite_20_20_HY"], [rows[name] for name in RIVALS]
     first = {ms: ours[ms] < min(rival[ms] for rival in rivals) for ms in ours}
     numbers = {f"{name}, {ms}": rows[name][ms]
@@ -281,4 +297,5 @@ RULES = {
     "S1": s1, "S2": s2, "S2-seams": s2_seams, "S3": s3, "S3-noise": s3_noise, "S4": s4,
     "S4-filters": s4_filters, "S5": s5, "S6": s6, "S7": s7, "S8": s8, "S9": s9,
     "S10-noise": s10_noise, "S10-narrow": s10_narrow,
+    "S10-backward": s10_backward,
 }  # fmt: skip

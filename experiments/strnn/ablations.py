@@ -1,7 +1,7 @@
 """What parts and lengths of an STRNN are worth, by manifold distance: the claims S1, S2, S8, S9, S10.
 
     python -m experiments.strnn.ablations [--data runs/everything.npz] [--list] [--only ROW ...]
-        [--preset table|long|smoke] [--output results/strnn_ablations.json]
+        [--preset table|long|smoke] [--as-it-is] [--output results/strnn_ablations.json]
 
 Trains a list of networks, each kept in runs/strnn_ablations/: stopped and started again, it goes on.
 All make the same number of updates, 600 or, with the preset "long", 2000; what they took of time is
@@ -85,6 +85,8 @@ ROWS = (
     Row("no noise", "Temporal_20_20_MSE without noise on what it reads", {**TEMPORAL, "noise": 0.0}),
     Row("steady noise", "Temporal_20_20_MSE, noise that does not shrink", {**TEMPORAL, "quiet": 0}),
     Row("narrow", "SpatioTemp_20_20_LH with a code of 32 numbers", {**SPATIOTEMP, **LH, "width": 32}),
+    Row("forwards", "Temporal_20_20_MSE, whose decoder says the first frame first",
+        {**TEMPORAL, "backward": False}),
     *(Row(method, "foretells one frame at a time", method=method) for method in METHODS),
 )  # fmt: skip
 # What is to be nearer to real motion, and than what.
@@ -112,6 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--only", nargs="+", metavar="ROW", choices=[row.name for row in ROWS])
     parser.add_argument("--seeds", type=int, default=3, help="of the main rows, at most")
     parser.add_argument("--list", action="store_true", help="show what is done, and stop")
+    parser.add_argument("--as-it-is", action="store_true", help="judge what is done, train nothing")
     parser.add_argument("--split", default="test", choices=("val", "test"))
     parser.add_argument("--output", help="by default the preset's of results/")
     chosen = parser.parse_args(arguments)
@@ -125,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     data = in_body_frame(Prepared.find(chosen.data))
     for run in runs:
-        if not run.done:
+        if not run.done and not chosen.as_it_is:
             run.train(data, run.row.name)
     runs = [run for run in runs if run.done]
     result = {
@@ -191,6 +194,7 @@ def judged(runs: Sequence[Run], data: Prepared, split: str) -> dict:
         row["seeds"][str(run.seed)] = of_one(model, seeds, clips, data, real) | {
             "updates": run.made, "seconds of training": run.curve[-1]["seconds"],
             "validation": run.validation,
+            "curve": {str(point["update"]): point["val"] for point in run.curve},
         }  # fmt: skip
     follows = [clip[at:][:FRAMES] for clip, at in zip(chosen, starts, strict=True)]
     follows = [data.normalizer(clip) for clip in follows if len(clip) >= 40]
