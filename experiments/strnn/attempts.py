@@ -83,7 +83,7 @@ def taught(model: Strnn, attempt: Attempt, data: Prepared, updates: int) -> None
     """Let a network learn; `Windows` of one more prediction, so that it may read its own frames."""
     windows = Windows(data.clips("train"), model.frames + model.predict)
     optimizer = torch.optim.Adam(model.parameters(), RATE)
-    model.train()
+    model.train().requires_grad_(True)  # what is loaded to be used does not learn
     for update in range(updates):
         chance = torch.Generator().manual_seed(update)
         optimizer.param_groups[0]["lr"] = RATE * (1 - update / updates)
