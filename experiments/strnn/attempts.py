@@ -1,7 +1,7 @@
 """What moves the shipped STRNN's bones, survival and loops: short trainings from its weights.
 
-    python -m experiments.strnn.attempts WEIGHTS [--data runs/everything.npz] [--updates 400]
-        [--starts 50] [--frames 4000] [--output results/strnn_attempts.json]
+    python -m experiments.strnn.attempts WEIGHTS [--data runs/everything.npz] [--updates 250]
+        [--starts 40] [--frames 2400] [--output results/strnn_attempts.json]
 
 Each attempt goes on from the weights by as many updates, all of the network at once, and is judged on
 validation clips: no claim hangs on it. Nothing is kept but the numbers.
@@ -56,9 +56,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("weights", type=Path)
     parser.add_argument("--data", default="runs/everything.npz")
-    parser.add_argument("--updates", type=int, default=400)
-    parser.add_argument("--starts", type=int, default=50)
-    parser.add_argument("--frames", type=int, default=4000)
+    parser.add_argument("--updates", type=int, default=250)
+    parser.add_argument("--starts", type=int, default=40)
+    parser.add_argument("--frames", type=int, default=2400)
     parser.add_argument("--output", default="results/strnn_attempts.json")
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
