@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from .verdict import NOT, PARTLY, REPRODUCED, Absent, Verdict
 
 STARTS, FRAMES, WINDOWS = 50, 20_000, 512
 CONTROLLED = 1_000  # frames of a run along a path
-RIVALS = ("lstm-3lr", "erd", "seq2seq", "6-gram")
+RIVALS = ("lstm-3lr", "erd", "seq2seq", "crbm", "6-gram", "gpdm")
 SHORT = 10.0  # seconds; a cycle that is shorter is a loop that is seen
 
 
@@ -20,11 +22,40 @@ def _row(found: dict) -> dict:
 # -- S1, S2, S8, S9, S10: ablations ---------------------------------------------------------------
 
 
-def _ablated(found: dict, claim: str = "") -> dict:
-    """Rows, or the pairs of a claim, of a result that counts."""
-    if found["split"] != "test" or found["preset"] != "table":
-        raise Absent("the result there is not of test clips, or of another preset than table")
-    return found["pairs"][claim] if claim else found["rows"]
+LENGTHS = ("39_1", "35_5", "30_10", "20_20")  # that are read and foretold
+SHORTER = ("20_20", "10_10", "5_5")
+
+
+def _counts(found: dict) -> dict:
+    if found["split"] != "test" or found["preset"] not in ("long", "table"):
+        raise Absent("the result there is not of test clips, or of another preset than these")
+    return found
+
+
+def _rows(budgets: tuple[dict, ...], names: Iterable[str]) -> tuple[dict, dict]:
+    """The first result, the longest budget coming first, in which all of these rows are; and its rows."""
+    for found in map(_counts, budgets):
+        if all(name in found["rows"] for name in names):
+            return found, found["rows"]
+    raise Absent("no result there has all rows that are compared")
+
+
+def _pairs(budgets: tuple[dict, ...], claim: str) -> tuple[dict, dict]:
+    """Pairs of a claim in the first result that has as many of them as any; and its numbers, and those
+    of the other results beside them."""
+    most = max(len(_counts(found)["pairs"][claim]) for found in budgets)
+    judged = next(found for found in budgets if len(found["pairs"][claim]) == most)
+    told = {}
+    for found in (judged, *(its for its in budgets if its is not judged)):
+        for pair, its in found["pairs"][claim].items():
+            updates = _updates(found)
+            told[f"{pair}, {updates} updates: {its['found']}, by"] = -its["difference"]["value"]
+    return judged["pairs"][claim], told
+
+
+def _updates(found: dict) -> int:
+    """Of each training of a result."""
+    return next(iter(found["rows"].values()))["seeds"]["0"]["updates"]
 
 
 def _distance(row: dict, seed: str = "0") -> float:
@@ -32,70 +63,80 @@ def _distance(row: dict, seed: str = "0") -> float:
     return sum(far) / len(far)
 
 
-def _told(pairs: dict) -> dict:
-    """How much nearer the first of each pair is, as the ledger shows it."""
-    return {
-        f"{pair}: {its['found']}, by": -its["difference"]["value"] for pair, its in pairs.items()
-    }
-
-
-def s1(limits: dict, found: dict) -> Verdict:
-    rows = _ablated(found)
-    names = {length: f"Temporal_{length}_MSE" for length in ("39_1", "35_5", "30_10", "20_20")}
+def s1(limits: dict, *budgets: dict) -> Verdict:
+    names = {length: f"Temporal_{length}_MSE" for length in LENGTHS}
+    found, rows = _rows(budgets, names.values())
     error = {n: rows[name]["seeds"]["0"]["errors"]["all"] for n, name in names.items()}
     far = {n: _distance(rows[name]) for n, name in names.items()}
     fits = (error["20_20"] <= limits["less"] * error["30_10"]
             and error["30_10"] <= limits["less"] * error["35_5"])  # fmt: skip
-    numbers = {f"squared error, {n}": its for n, its in error.items()}
+    numbers = {"updates": _updates(found)}
+    numbers |= {f"squared error, {n}": its for n, its in error.items()}
     numbers |= {f"manifold distance, {n}": its for n, its in far.items()}
     numbers["manifold distance of real motion"] = found["real"]["to real"]
     good = [fits, min(far, key=far.get) == "20_20"]
     return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
 
 
-def s2(limits: dict, found: dict) -> Verdict:
-    pairs = _ablated(found, "S2")
+def s2(limits: dict, *budgets: dict) -> Verdict:
+    pairs, told = _pairs(budgets, "S2")
     results = [its["found"] for its in pairs.values()]
     nearer = results.count("better") / len(results)
     full = pairs["Composite_20_20_HY < Temporal_39_1_MSE"]["found"] == "better"
     if full and nearer >= limits["most"] and "worse" not in results:
-        return Verdict(REPRODUCED, _told(pairs))
-    return Verdict(PARTLY if full or nearer >= 0.5 else NOT, _told(pairs))
+        return Verdict(REPRODUCED, told)
+    return Verdict(PARTLY if full or nearer >= 0.5 else NOT, told)
 
 
-def s8(limits: dict, found: dict) -> Verdict:
-    pairs = _ablated(found, "S8")
+def s8(limits: dict, *budgets: dict) -> Verdict:
+    pairs, told = _pairs(budgets, "S8")
     results = [its["found"] for its in pairs.values()]
     if results.count("better") == len(results):
-        return Verdict(REPRODUCED, _told(pairs))
+        return Verdict(REPRODUCED, told)
     partly = "better" in results and "worse" not in results
-    return Verdict(PARTLY if partly else NOT, _told(pairs))
+    return Verdict(PARTLY if partly else NOT, told)
 
 
-def s9(limits: dict, found: dict) -> Verdict:
-    rows, pairs = _ablated(found), _ablated(found, "S9")
-    far = {n: _distance(rows[f"Composite_{n}_HY"]) for n in ("20_20", "10_10", "5_5")}
+def s9(limits: dict, *budgets: dict) -> Verdict:
+    names = {n: f"Composite_{n}_HY" for n in SHORTER}
+    found, rows = _rows(budgets, (*names.values(), "Temporal_20_20_MSE", "unconditional"))
+    pairs, told = _pairs((found,), "S9")
+    far = {n: _distance(rows[name]) for n, name in names.items()}
     good = [
         all(its["found"] == "better" for its in pairs.values()),
         max(far["10_10"], far["5_5"]) <= limits["more"] * far["20_20"],
     ]
-    numbers = _told(pairs) | {f"manifold distance, {n}": its for n, its in far.items()}
+    numbers = told | {f"manifold distance, {n}": its for n, its in far.items()}
     return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
 
 
-def s10_noise(limits: dict, found: dict) -> Verdict:
-    pairs = _ablated(found, "S10-noise")
+def s10_noise(limits: dict, *budgets: dict) -> Verdict:
+    pairs, told = _pairs(budgets, "S10-noise")
     none, steady = (pairs[f"Temporal_20_20_MSE < {name}"]["found"]
                     for name in ("no noise", "steady noise"))  # fmt: skip
     if none == "better" and steady != "worse":
-        return Verdict(REPRODUCED, _told(pairs))
-    return Verdict(PARTLY if "better" in (none, steady) else NOT, _told(pairs))
+        return Verdict(REPRODUCED, told)
+    return Verdict(PARTLY if "better" in (none, steady) else NOT, told)
 
 
-def s10_narrow(limits: dict, found: dict) -> Verdict:
-    pairs = _ablated(found, "S10-narrow")
+def s10_backward(limits: dict, found: dict) -> Verdict:
+    found, rows = _rows((found,), ("Temporal_20_20_MSE", "forwards"))
+    both = [rows[name]["seeds"]["0"] for name in ("Temporal_20_20_MSE", "forwards")]
+    numbers = {"updates": _updates(found)}
+    numbers |= {f"validation loss of the other's, after {updates} updates": its / both[1]["curve"][updates]
+                for updates, its in both[0]["curve"].items()}  # fmt: skip
+    losses = [its for name, its in numbers.items() if "loss" in name]
+    said = both[0]["errors"]["decoded"] / both[1]["errors"]["decoded"]
+    numbers["squared error of frames said again, of the other's"] = said
+    if max(*losses, said) <= limits["less"]:
+        return Verdict(REPRODUCED, numbers)
+    return Verdict(PARTLY if max(losses) < 1 else NOT, numbers)
+
+
+def s10_narrow(limits: dict, *budgets: dict) -> Verdict:
+    pairs, told = _pairs(budgets, "S10-narrow")
     wide = all(its["found"] == "better" for its in pairs.values())
-    return Verdict(REPRODUCED if wide else NOT, _told(pairs))
+    return Verdict(REPRODUCED if wide else NOT, told)
 
 
 # -- S2: seams ------------------------------------------------------------------------------------
@@ -229,6 +270,8 @@ def s6(limits: dict, found: dict) -> Verdict:
     if found["split"] != "test":
         raise Absent("the result there is not of test clips")
     rows = found["rows"]
+    if missing := [name for name in RIVALS if name not in rows]:
+        raise Absent(f"the result there has no {', '.join(missing)}")
     ours, rivals = rows["Composite_20_20_HY"], [rows[name] for name in RIVALS]
     first = {ms: ours[ms] < min(rival[ms] for rival in rivals) for ms in ours}
     numbers = {f"{name}, {ms}": rows[name][ms]
@@ -254,4 +297,5 @@ RULES = {
     "S1": s1, "S2": s2, "S2-seams": s2_seams, "S3": s3, "S3-noise": s3_noise, "S4": s4,
     "S4-filters": s4_filters, "S5": s5, "S6": s6, "S7": s7, "S8": s8, "S9": s9,
     "S10-noise": s10_noise, "S10-narrow": s10_narrow,
+    "S10-backward": s10_backward,
 }  # fmt: skip

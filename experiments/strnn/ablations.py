@@ -1,12 +1,12 @@
 """What parts and lengths of an STRNN are worth, by manifold distance: the claims S1, S2, S8, S9, S10.
 
     python -m experiments.strnn.ablations [--data runs/everything.npz] [--list] [--only ROW ...]
-        [--preset smoke] [--output results/strnn_ablations.json]
+        [--preset table|long|smoke] [--as-it-is] [--output results/strnn_ablations.json]
 
 Trains a list of networks, each kept in runs/strnn_ablations/: stopped and started again, it goes on.
-All make the same number of updates; what they took of time is told beside. The first seed of all rows
-comes first. Then each goes on for 200 frames from prefixes of test clips. How it is judged stands in
-claims.yaml.
+All make the same number of updates, 600 or, with the preset "long", 2000; what they took of time is
+told beside. The first seed of all rows comes first. Then each goes on for 200 frames from prefixes of
+test clips. How it is judged stands in claims.yaml.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ TABLE = replace(
     PRESETS["strnn"]["table"], updates=600, decay=200, validate_every=200, warmup=50, quiet=300,
     smooth=0.0, alone=0, behind=0,
 )  # fmt: skip
+LONG = replace(TABLE, updates=2_000, decay=667, validate_every=500, quiet=1_000)
 SMOKE = replace(TABLE, updates=4, decay=1, validate_every=2, batch=4, width=32, quiet=2)
+BUDGETS = {"table": TABLE, "long": LONG, "smoke": SMOKE}
+RESULTS = {"table": "results/strnn_ablations.json", "long": "results/strnn_ablations_long.json"}
 LH = {"smooth": 0.1}
 TEMPORAL = {"spatial": False, "residual": False}
 SPATIOTEMP = {"residual": False}
@@ -82,6 +85,8 @@ ROWS = (
     Row("no noise", "Temporal_20_20_MSE without noise on what it reads", {**TEMPORAL, "noise": 0.0}),
     Row("steady noise", "Temporal_20_20_MSE, noise that does not shrink", {**TEMPORAL, "quiet": 0}),
     Row("narrow", "SpatioTemp_20_20_LH with a code of 32 numbers", {**SPATIOTEMP, **LH, "width": 32}),
+    Row("forwards", "Temporal_20_20_MSE, whose decoder says the first frame first",
+        {**TEMPORAL, "backward": False}),
     *(Row(method, "foretells one frame at a time", method=method) for method in METHODS),
 )  # fmt: skip
 # What is to be nearer to real motion, and than what.
@@ -105,15 +110,17 @@ PAIRS = {
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", default="runs/everything.npz")
-    parser.add_argument("--preset", default="table", choices=("table", "smoke"))
+    parser.add_argument("--preset", default="table", choices=tuple(BUDGETS))
     parser.add_argument("--only", nargs="+", metavar="ROW", choices=[row.name for row in ROWS])
     parser.add_argument("--seeds", type=int, default=3, help="of the main rows, at most")
     parser.add_argument("--list", action="store_true", help="show what is done, and stop")
+    parser.add_argument("--as-it-is", action="store_true", help="judge what is done, train nothing")
     parser.add_argument("--split", default="test", choices=("val", "test"))
-    parser.add_argument("--output", default="results/strnn_ablations.json")
+    parser.add_argument("--output", help="by default the preset's of results/")
     chosen = parser.parse_args(arguments)
-    if chosen.preset != "table" and chosen.output == parser.get_default("output"):
-        parser.error("another preset than table is not the result: name an --output")
+    output = chosen.output or RESULTS.get(chosen.preset)
+    if not output:
+        parser.error(f"the preset {chosen.preset} is not the result: name an --output")
     begin = time.perf_counter()
     runs = [run for run in in_order(chosen.only, chosen.preset) if run.seed < chosen.seeds]
     if chosen.list:
@@ -121,35 +128,36 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     data = in_body_frame(Prepared.find(chosen.data))
     for run in runs:
-        if not run.done:
+        if not run.done and not chosen.as_it_is:
             run.train(data, run.row.name)
     runs = [run for run in runs if run.done]
     result = {
         "preset": chosen.preset, "split": chosen.split, "starts": STARTS, "frames": FRAMES,
     } | judged([run for run in runs if run.row.method not in METHODS], data, chosen.split)  # fmt: skip
-    record.write(record.provenance(begin, 0, data) | result, chosen.output)
+    record.write(record.provenance(begin, 0, data) | result, output)
 
 
 # -- trainings ------------------------------------------------------------------------------------
 
 
 def in_order(only: Sequence[str] | None = None, preset: str = "table") -> list[Run]:
-    """All trainings, the first seed of every row first."""
+    """All trainings, the first seed of every row first; the long ones without the rivals of S6."""
     runs = [
         Run(row, seed, preset_of(row, seed, preset), folder_of(preset) / row.name / f"seed-{seed}")
         for row in ROWS if only is None or row.name in only for seed in row.seeds
+        if preset != "long" or row.method not in METHODS
     ]  # fmt: skip
     return sorted(runs, key=lambda run: run.seed)
 
 
 def folder_of(preset: str) -> Path:
     """Where trainings are kept."""
-    return FOLDER if preset == "table" else FOLDER.with_name(f"{FOLDER.name}-{preset}")
+    return FOLDER if preset == "table" else FOLDER / preset
 
 
 def preset_of(row: Row, seed: int, name: str = "table") -> Preset:
     """The preset of a row's training; a tenth and a sixth of its updates are the last two stages."""
-    base = TABLE if name == "table" else SMOKE
+    base = BUDGETS[name]
     if row.method in METHODS:
         shared = {key: getattr(base, key) for key in Preset.__dataclass_fields__}
         return RivalPreset(**shared | {"noise": 0.0, "seed": seed}, method=row.method)
@@ -186,6 +194,7 @@ def judged(runs: Sequence[Run], data: Prepared, split: str) -> dict:
         row["seeds"][str(run.seed)] = of_one(model, seeds, clips, data, real) | {
             "updates": run.made, "seconds of training": run.curve[-1]["seconds"],
             "validation": run.validation,
+            "curve": {str(point["update"]): point["val"] for point in run.curve},
         }  # fmt: skip
     follows = [clip[at:][:FRAMES] for clip, at in zip(chosen, starts, strict=True)]
     follows = [data.normalizer(clip) for clip in follows if len(clip) >= 40]

@@ -1,4 +1,4 @@
-"""Networks of chapter 4 that foretell one frame at a time, on the rows that STRNN learns from."""
+"""Networks that foretell one frame at a time, those of chapter 4 and a CRBM, on STRNN's rows."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import torch
 from torch import nn
 
-from motionlab.models import AcLstm, Erd, Seq2Seq
+from motionlab.models import AcLstm, Crbm, Erd, Seq2Seq
 from motionlab.models.erd import noise_schedule
 from motionlab.training import Prepared, Preset
 from motionlab.training.strnn import in_body_frame
 from motionlab.training.windows import Windows
 
-METHODS = ("lstm-3lr", "erd", "seq2seq")
+METHODS = ("lstm-3lr", "erd", "seq2seq", "crbm")
+ORDER = 3  # frames that the CRBM looks back
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,9 @@ class RivalPreset(Preset):
         return Windows(in_body_frame(data).clips(split), self.frames)
 
     def extras(self, shape: torch.Size, update: int, generator: torch.Generator) -> dict:
-        """Noise, more and more of it, on every second frame or so of an ERD; nothing else."""
+        """Noise, more and more of it, on every second frame or so of an ERD; a CRBM's chance."""
+        if self.method == "crbm":
+            return {"lots": torch.randint(2**31, shape[:1], generator=generator)}
         if self.method != "erd":
             return {}
         hit = torch.rand(shape[:2], generator=generator) < 0.5
@@ -43,4 +46,6 @@ class RivalPreset(Preset):
             return Seq2Seq(
                 data.encoding, data.normalizer, 5 * self.width // 2, seen=self.frames // 2
             )
+        if self.method == "crbm":
+            return Crbm(data.encoding, data.normalizer, 4 * self.width, ORDER)
         return AcLstm(data.encoding, data.normalizer, self.width)

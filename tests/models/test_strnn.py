@@ -55,7 +55,7 @@ def by_hand(model: Strnn, read: torch.Tensor, true: torch.Tensor | None = None) 
                        its.bias_ih_l0 + its.bias_hh_l0)  # fmt: skip
     said = {}
     for part, order in (
-        (model.decoder, range(model.encode - 1, -1, -1)),
+        (model.decoder, range(model.encode)[:: -1 if model.backward else 1]),
         (model.predictor, range(model.encode, model.frames)),
     ):
         own_h, own_c, heard = h, c, model.leave(h)
@@ -68,8 +68,9 @@ def by_hand(model: Strnn, read: torch.Tensor, true: torch.Tensor | None = None) 
 
 
 @pytest.mark.parametrize("conditional", [True, False])
-def test_it_says_what_a_loop_of_cells_says(clips, conditional):
-    model = made(clips, "temporal", conditional=conditional)
+@pytest.mark.parametrize("backward", [True, False])
+def test_it_says_what_a_loop_of_cells_says(clips, conditional, backward):
+    model = made(clips, "temporal", conditional=conditional, backward=backward)
     true = model.normalizer(clips[1][:, :7])
     found, _ = model._said(true[:, :4], None if conditional else true)
     torch.testing.assert_close(found, by_hand(model, true[:, :4], None if conditional else true))
@@ -212,6 +213,30 @@ def test_noise_at_run_time_has_a_source(clips):
     assert torch.equal(go(1), go(1)) and not torch.equal(go(1), go(2))
 
 
+@torch.no_grad()
+@pytest.mark.parametrize("kind", ["temporal", "composite"])
+def test_a_faded_seam_goes_on_where_the_last_window_was_going(clips, kind):
+    model = made(clips, kind, encode=6, predict=8)
+    seen = clips[1][:3]
+    plain, faded = model.extrapolate(seen, 30), model.extrapolate(seen, 30, fade=5)
+    glides = model.normalizer.kept[model.glides]
+    before, whole = (torch.cat([seen, some], 1)[..., glides] for some in (plain, faded))
+    bend = lambda some, t: float((some[:, t] - 2 * some[:, t - 1] + some[:, t - 2]).abs().max())
+    left = (torch.arange(5, 0, -1) / 5).square()[:, None]
+    for begin in (40, 48, 56):  # the first seam is that to the frames that were read
+        assert bend(whole, begin) < 1e-8 < 1e-3 < bend(before, begin)
+        off = before[:, begin : begin + 8] - whole[:, begin : begin + 8]
+        assert torch.allclose(off[:, :5], left * off[:, :1])
+        assert torch.allclose(off[:, 5:], torch.zeros(()).double())
+    rest = [i for i in range(faded.shape[-1]) if i not in glides.tolist()]
+    assert torch.equal(faded[..., rest], plain[..., rest])  # contacts are or are not
+    assert torch.equal(model.extrapolate(seen, 30, fade=0), plain)
+    assert torch.allclose(model.extrapolate(seen, 12, fade=5), faded[:, :12])
+    for fade in (8, -1, 2.5):
+        with pytest.raises(ModelError, match="give 0 to 7"):
+            model.extrapolate(seen, 5, fade=fade)
+
+
 def test_frames_are_said_again_window_by_window(clips):
     model, features = made(clips).eval(), clips[1][:, :10]
     found = model.reconstruct(features)
@@ -230,12 +255,14 @@ def test_a_projection_is_the_mean_of_all_that_is_said(clips):
     torch.testing.assert_close(model.project(features, step=1), said.nanmean(0))
 
 
-def test_what_was_learned_travels(clips, tmp_path):
-    model = made(clips).float()
+@pytest.mark.parametrize("backward", [True, False])
+def test_what_was_learned_travels(clips, tmp_path, backward):
+    model = made(clips, backward=backward).float()
     save_weights(tmp_path / "some.safetensors", model, {})
     again, _ = load_weights(tmp_path / "some.safetensors")
     features = clips[1].float()
     assert torch.equal(again.extrapolate(features, 5), model.extrapolate(features, 5))
+    assert torch.equal(again.reconstruct(features), model.reconstruct(features))
 
 
 @pytest.mark.parametrize("what", ["extrapolate", "reconstruct", "project"])

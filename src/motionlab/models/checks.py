@@ -55,6 +55,23 @@ def checked_features(model: _Model, features: Tensor) -> Tensor:
     return features
 
 
+def checked_going_on(
+    model: _Model, features: Tensor, n: int, least: int, kind: str
+) -> tuple[Tensor, bool]:
+    """Features (batch, frames, dim) from which `kind`, which reads `least` frames, can go on by n.
+
+    And whether it was one clip (frames, dim). Raises ModelError.
+    """
+    if not isinstance(n, Integral) or n < 1:
+        raise ModelError(f"extrapolate: {n!r} frames; ask for 1 or more.")
+    features = as_features(model, features)
+    one = features.ndim == 2
+    features = checked_features(model, features[None] if one else features)
+    if features.shape[1] < least:
+        raise ModelError(f"extrapolate: {features.shape[1]} frames; {kind} reads {least}.")
+    return features, one
+
+
 def checked_start(model: _Model, n: int, start: State) -> State:
     """The state, on the model's device and in its precision, from which n frames can be generated.
 

@@ -8,7 +8,6 @@ Nothing that it says is unnatural, and nothing is new.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Integral
 from typing import Self
 
 import torch
@@ -16,7 +15,7 @@ from torch import Tensor, nn
 
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
-from .checks import as_features, check_counts, check_normalizer, checked_features
+from .checks import check_counts, check_normalizer, checked_features, checked_going_on
 
 AT_ONCE = 1 << 24  # distances in memory
 
@@ -81,17 +80,9 @@ class Ngram(nn.Module):
         ModelError : nothing is remembered, fewer frames than `encode`, another number of channels, NaN,
             or n below 1.
         """
-        if not isinstance(n, Integral) or n < 1:
-            raise ModelError(f"extrapolate: {n!r} frames; ask for 1 or more.")
         if not len(self.starts):
             raise ModelError("extrapolate: this n-gram remembers nothing; `Ngram.fit` makes one.")
-        features = as_features(self, features)
-        one = features.ndim == 2
-        features = checked_features(self, features[None] if one else features)
-        if features.shape[1] < self.encode:
-            raise ModelError(
-                f"extrapolate: {features.shape[1]} frames; this n-gram reads {self.encode}."
-            )
+        features, one = checked_going_on(self, features, n, self.encode, "this n-gram")
         seen, made = self.normalizer(features)[:, -self.encode :], []
         for _ in range(-(-n // self.predict)):
             after = self._nearest(seen) + self.encode

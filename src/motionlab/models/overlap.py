@@ -1,4 +1,5 @@
-"""Windows that overlap: those of clips, as rows; what is said of a frame in all of them, averaged."""
+"""Windows and where they meet: those of clips, as rows; what is said of a frame in all that hold it,
+averaged; the jump from one to the next, faded."""
 
 from __future__ import annotations
 
@@ -38,3 +39,22 @@ def mean_of_windows(
         total[:, span] += say(frames[:, span])
         count[span] += 1
     return total / count
+
+
+def without_jumps(frames: Tensor, first: int, window: int, fade: int) -> Tensor:
+    """Frames (batch, frames, channels) of which each window begins where the one before was going.
+
+    That is on the line through the two frames before the seam. By how much the window's first frame is
+    off that line is taken from it, and less and less from those after it, by the square of what is left
+    of `fade` frames; as engines do where one clip gives way to the next.
+
+    first : frame where the first window begins, 2 or more. window : frames of each.
+    """
+    found = frames.clone()
+    left = (1 - torch.arange(fade).to(frames) / fade).square()[:, None]
+    for begin in range(first, frames.shape[1], window):
+        further, last = found[:, begin - 2], found[:, begin - 1]
+        jump = found[:, begin] - (2 * last - further)
+        some = found[:, begin : begin + fade]
+        some -= left[: some.shape[1]] * jump[:, None]
+    return found

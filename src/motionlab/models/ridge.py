@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from ..encodings import Encoding, Normalizer
 from ..errors import ModelError
-from .checks import as_features, check_counts, check_normalizer, checked_features
+from .checks import check_counts, check_normalizer, checked_going_on
 from .overlap import rows_of_windows
 
 
@@ -108,15 +108,7 @@ class Ridge(nn.Module):
         ------
         ModelError : fewer frames than `encode`, another number of channels, NaN, or n below 1.
         """
-        if not isinstance(n, Integral) or n < 1:
-            raise ModelError(f"extrapolate: {n!r} frames; ask for 1 or more.")
-        features = as_features(self, features)
-        one = features.ndim == 2
-        features = checked_features(self, features[None] if one else features)
-        if features.shape[1] < self.encode:
-            raise ModelError(
-                f"extrapolate: {features.shape[1]} frames; this regression reads {self.encode}."
-            )
+        features, one = checked_going_on(self, features, n, self.encode, "this regression")
         seen, made = self.normalizer(features)[:, -self.encode :], []
         for _ in range(-(-n // self.predict)):
             said = torch.nn.functional.linear(seen.flatten(1), self.weight, self.bias)

@@ -10,8 +10,6 @@ are lost from the text that we have; they are built anew from its words.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from numbers import Integral
 from typing import Literal, Self
 
@@ -21,11 +19,19 @@ from torch import Tensor, nn
 from .. import encodings
 from ..encodings import BodyFrame, Normalizer
 from ..errors import ModelError
-from .checks import as_features, check_noise, check_normalizer, checked_features
+from .at_rest import at_rest
+from .checks import (
+    as_features,
+    check_counts,
+    check_noise,
+    check_normalizer,
+    checked_features,
+    checked_going_on,
+)  # fmt: skip
 from .going_on import GoingOn
 from .noise import normal
-from .overlap import mean_of_windows
-from .strnn_parts import SpatialDecoder, SpatialEncoder, part_channels
+from .overlap import mean_of_windows, without_jumps
+from .strnn_parts import SpatialDecoder, SpatialEncoder, part_channels, residual_layers
 from .unchanged import made_of
 
 # Of the training in three stages (section 4.2.4): all but the residual network, the residual network
@@ -53,6 +59,7 @@ class Strnn(nn.Module):
         one linear layer.
     residual : four layers over all frames that were said, whose output is added to them. It begins as
         nothing.
+    backward : the decoder says the last frame first, which is remembered best.
     conditional : decoder and predictor hear what they have said; otherwise, in training, the true frame.
     drop : share of the spatial network's units that are dropped in training.
     smooth : w_s, what mean squared second differences cost in training, eq. 4 and 7; 0 is the paper's
@@ -83,6 +90,7 @@ class Strnn(nn.Module):
         drop: float = 0.1,
         smooth: float = 0.0,
         penalty: float = 0.0,
+        backward: bool = True,
     ) -> None:
         super().__init__()
         check_normalizer(encoding, normalizer)
@@ -92,7 +100,7 @@ class Strnn(nn.Module):
         self.encoding, self.normalizer = encoding, normalizer
         self.width, self.encode, self.predict = width, encode, predict
         self.spatial, self.residual, self.conditional = spatial, residual, conditional
-        self.drop, self.smooth, self.penalty = drop, smooth, penalty
+        self.drop, self.smooth, self.penalty, self.backward = drop, smooth, penalty, backward
         self.kept = kept = len(normalizer.kept)
         size = kept
         if spatial:
@@ -105,7 +113,7 @@ class Strnn(nn.Module):
         self.encoder = nn.LSTM(size, width, batch_first=True)
         self.decoder, self.predictor = GoingOn(size, width), GoingOn(size, width)
         if residual:
-            self.filter = _residual(self.frames * kept, width)
+            self.filter = residual_layers(self.frames * kept, width)
         jerky = torch.ones(encoding.dim, dtype=torch.bool)  # a contact bit may jump
         jerky[encoding.slices.get("contacts", slice(0))] = False
         self.register_buffer("glides", jerky[normalizer.kept], persistent=False)
@@ -203,13 +211,13 @@ class Strnn(nn.Module):
         back = ahead = None
         if true is not None:
             heard = self.enter(true, chance) if self.spatial else true
-            back = heard[:, 1 : self.encode].flip(1)  # after frame t was to be said, t is heard
+            back = heard[:, : self.encode]  # after frame t was to be said, t is heard
+            back = back.flip(1)[:, :-1] if self.backward else back[:, :-1]
             ahead = heard[:, self.encode : -1]
         codes = self.predictor(state, self.predict, ahead_alone, ahead)
-        if decoded:  # the last frame first: that is the order in which they are remembered best
-            codes = torch.cat(
-                [self.decoder(state, self.encode, back_alone, back).flip(1), codes], 1
-            )
+        if decoded:
+            before = self.decoder(state, self.encode, back_alone, back)
+            codes = torch.cat([before.flip(1) if self.backward else before, codes], 1)
         return (self.leave(codes, chance) if self.spatial else self.leave(codes)), codes
 
     def _alone(self) -> list[tuple[Tensor, Tensor]]:
@@ -236,6 +244,7 @@ class Strnn(nn.Module):
         *,
         noise: float = 0.0,
         generator: torch.Generator | None = None,
+        fade: int = 0,
     ) -> Tensor:
         """n frames (batch, n, dim) that go on from features (batch, frames, dim), in open loop.
 
@@ -247,16 +256,20 @@ class Strnn(nn.Module):
         noise : standard deviation of what is added to frames that are read, in normalised units.
             Without it one start has one future, and it may end in a loop.
         generator : source of chance, for the noise.
+        fade : frames over which the jump at the begin of each window dies away (`without_jumps`); 0: as
+            the network says them. What it reads is as it said it, all the same.
 
         Raises
         ------
-        ModelError : fewer frames than `encode`, another number of channels, NaN, or n below 1.
+        ModelError : fewer frames than `encode`, another number of channels, NaN, n below 1, or a fade
+            that does not end before its window.
         """
         check_noise(noise)
-        if not isinstance(n, Integral) or n < 1:
-            raise ModelError(f"extrapolate: {n!r} frames; ask for 1 or more.")
-        seen, one = self._checked("extrapolate", features)
-        seen, made = seen[:, -self.encode :], []
+        features, one = checked_going_on(self, features, n, self.encode, "this network")
+        if not isinstance(fade, Integral) or not 0 <= fade < self.predict:
+            raise ModelError(f"extrapolate: fade is {fade!r}; give 0 to {self.predict - 1} frames.")
+        seen, made = self.normalizer(features)[:, -self.encode :], []
+        before = seen[:, [-min(2, self.encode), -1]]
         with at_rest(self):
             for _ in range(-(-n // self.predict)):
                 read = seen + noise * normal(seen, generator) if noise else seen
@@ -266,7 +279,12 @@ class Strnn(nn.Module):
                     said, _ = self._said(read, decoded=False)
                 made.append(said)
                 seen = torch.cat([seen, said], 1)[:, -self.encode :]
-        found = self.normalizer.inverse(torch.cat(made, 1)[:, :n])
+        found = torch.cat(made, 1)[:, :n]
+        if fade:
+            found[..., self.glides] = without_jumps(
+                torch.cat([before, found], 1)[..., self.glides], 2, self.predict, fade
+            )[:, 2:]
+        found = self.normalizer.inverse(found)
         return found[0] if one else found
 
     def reconstruct(self, features: Tensor) -> Tensor:
@@ -344,6 +362,7 @@ class Strnn(nn.Module):
     def config(self) -> dict:
         """What `from_config` needs to build an untrained copy; fit for JSON."""
         kept = {name: getattr(self, name) for name in self.settings}
+        kept |= {} if self.backward else {"backward": False}  # older weights don't say
         return {
             "encoding": self.encoding.config(), "kept": self.normalizer.kept.tolist(), **kept
         }  # fmt: skip
@@ -354,37 +373,14 @@ class Strnn(nn.Module):
         encoding = encodings.from_config(config["encoding"])
         normalizer = Normalizer(encoding.dim, len(config["kept"]))
         normalizer.kept.copy_(torch.tensor(config["kept"]))
-        return cls(encoding, normalizer, **{name: config[name] for name in cls.settings})
-
-
-@contextmanager
-def at_rest(model: nn.Module) -> Iterator[None]:
-    """A network as it is used: nothing is dropped, batch norm keeps its statistics."""
-    training = model.training
-    model.eval()
-    try:
-        yield
-    finally:
-        model.train(training)
-
-
-def _residual(size: int, width: int) -> nn.Sequential:
-    """Four layers over a window at once, of which the last says nothing at first."""
-    layers: list[nn.Module] = []
-    for before in (size, width, width):
-        layers += [nn.Linear(before, width), nn.ELU()]
-    last = nn.Linear(width, size)
-    nn.init.zeros_(last.weight)
-    nn.init.zeros_(last.bias)
-    return nn.Sequential(*layers, last)
+        names = (*cls.settings, *({"backward"} & config.keys()))
+        return cls(encoding, normalizer, **{name: config[name] for name in names})
 
 
 def _check(width, encode, predict, drop, smooth, penalty) -> None:
     if not isinstance(width, Integral) or width < 8 or width % 8:
         raise ModelError(f"Strnn: width is {width!r}; it must be a multiple of 8.")
-    for what, value in (("encode", encode), ("predict", predict)):
-        if not isinstance(value, Integral) or value < 1:
-            raise ModelError(f"Strnn: {what} is {value!r}; it must be a whole number from 1.")
+    check_counts("Strnn", encode=encode, predict=predict)
     if not 0 <= drop < 1:
         raise ModelError(f"Strnn: drop is {drop!r}; it must be a share, from 0 to below 1.")
     for what, value in (("smooth", smooth), ("penalty", penalty)):

@@ -196,3 +196,14 @@ def _sizes(parts: Mapping[str, Sequence[int]], width: int) -> tuple[dict[str, in
 def _order(parts: Mapping[str, Sequence[int]]) -> Tensor:
     """All channels, part by part."""
     return torch.tensor([channel for channels in parts.values() for channel in channels])
+
+
+def residual_layers(size: int, width: int) -> nn.Sequential:
+    """The residual network: four layers over a window at once, of which the last says nothing at first."""
+    layers: list[nn.Module] = []
+    for before in (size, width, width):
+        layers += [nn.Linear(before, width), nn.ELU()]
+    last = nn.Linear(width, size)
+    nn.init.zeros_(last.weight)
+    nn.init.zeros_(last.bias)
+    return nn.Sequential(*layers, last)

@@ -22,7 +22,7 @@ from ..encodings.path import turned, walk
 from ..errors import SolverError
 from ..feet.contacts import foot_points
 from ..models import Strnn
-from ..models.strnn import at_rest
+from ..models.at_rest import at_rest
 from ..paths import BACK, ON, Curves, Path
 
 RATES = {"weights": 3e-4, "state": 0.03}  # of learning

@@ -22,6 +22,7 @@ from ..models import (
     AcLstm,
     BidirectionalRnn,
     ConvAutoencoder,
+    Crbm,
     Erd,
     LstmGmm,
     Refiner,
@@ -32,6 +33,7 @@ from ..models.pfnn import Pfnn
 
 _MODELS = (
     LstmGmm, AcLstm, Erd, Seq2Seq, Refiner, Pfnn, Strnn, ConvAutoencoder, BidirectionalRnn,
+    Crbm,
 )  # fmt: skip
 _KINDS = {kind.__name__: kind for kind in _MODELS}
 _STARTS, _FRAMES = "starts.", "frames"

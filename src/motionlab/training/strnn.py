@@ -63,6 +63,8 @@ class StrnnPreset(Preset):
     """A network over all frames that were said takes jumps out."""
     conditional: bool = True
     """Decoder and predictor hear themselves, and not, in training, the true frames."""
+    backward: bool = True
+    """The decoder says the last frame first."""
     smooth: float = 0.0
     """w_s: what mean squared second differences cost. 0 is the paper's MSE, more its LH."""
     penalty: float = 0.0
@@ -134,7 +136,7 @@ class StrnnPreset(Preset):
         return Strnn(
             data.encoding, data.normalizer, self.width, self.frames - self.predict, self.predict,
             spatial=self.spatial, residual=self.residual, conditional=self.conditional,
-            drop=self.drop, smooth=self.smooth, penalty=self.penalty,
+            drop=self.drop, smooth=self.smooth, penalty=self.penalty, backward=self.backward,
         )  # fmt: skip
 
 

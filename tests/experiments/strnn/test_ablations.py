@@ -10,9 +10,11 @@ from experiments.strnn import ablations
 from motionlab.training.strnn import in_body_frame
 
 
-def test_all_rows_make_as_many_updates_and_differ_in_what_they_name():
-    runs = ablations.in_order()
-    assert {run.preset.updates for run in runs} == {600}
+@pytest.mark.parametrize(("preset", "updates"), [("table", 600), ("long", 2000)])
+def test_all_rows_make_as_many_updates_and_differ_in_what_they_name(preset, updates):
+    runs = ablations.in_order(preset=preset)
+    assert {run.preset.updates for run in runs} == {updates}
+    assert len({run.folder for run in runs}) == len(runs)
     first = [run for run in runs if run.seed == 0]
     assert runs[: len(first)] == first
     assert len({str(run.preset) for run in runs}) == len(runs)

@@ -22,7 +22,7 @@ def test_an_oracle_foretells_without_error_and_whoever_is_off_by_one_deviation_b
     assert all(abs(its - channels**0.5) < 1e-3 for its in found.values())
 
 
-def test_every_method_goes_on_from_the_same_frames(walks):
+def test_every_method_goes_on_from_the_same_frames(walks, monkeypatch):
     data = in_body_frame(walks)
     seen = torch.stack([clip[:20] for clip in data.clips("val")])
     for name in (*ablations.METHODS, "Temporal_20_20_MSE"):
@@ -30,6 +30,10 @@ def test_every_method_goes_on_from_the_same_frames(walks):
         with torch.no_grad():
             said = prediction.forecast_of(run.preset.model(walks))(seen, 20)
         assert said.shape == seen.shape and said.isfinite().all(), name
+    few = {"latent": 2, "length": 20, "frames": 60, "updates": 5}
+    monkeypatch.setattr(prediction, "GPDM", few)
+    gpdm = prediction.gpdm_of(data)
+    assert len(gpdm.rows) == 60 and gpdm.extrapolate(seen, 20).shape == seen.shape
     said = prediction.ngram_of(data).extrapolate(seen, 20)
     assert (
         torch.cdist(said.flatten(0, 1), torch.cat(data.clips("train"))).min(1).values.max() < 1e-2
