@@ -11,9 +11,9 @@ from motionlab import metrics
 from motionlab.errors import SolverError
 from motionlab.metrics import broken
 from motionlab.motion import concatenate
-from motionlab.paths import Path
+from motionlab.paths import Curves, Path
 from motionlab.solvers.guided import Going
-from motionlab.solvers.live_aim import BEND, HURRY, SIDEWAYS, SLOWED, Aim
+from motionlab.solvers.live_aim import BEND, HURRY, SIDEWAYS, SLOWED, STEPS, THERE, Aim
 from motionlab.solvers.live_control import LiveControl
 from motionlab.solvers.live_feet import Behind
 from motionlab.solvers.live_frame import slowest_foot
@@ -244,6 +244,30 @@ def test_who_stands_turns_before_he_goes_and_who_is_slow_goes_where_he_faces():
     assert aimed(faces, 0.5, math.pi / 2)[2] == pytest.approx(math.pi / 2)
     faces.velocity = 4 * faces.velocity  # who walks goes his way, however he faces
     assert aimed(faces, 1.2, math.pi / 2)[2] == pytest.approx(0)
+
+
+def test_who_stands_short_of_a_line_s_end_is_asked_for_steps_in_all_frames_of_a_window():
+    """And not to stand in its last ones, as if he had gone on meanwhile: he stood there for ever."""
+    now = going(speed=0.02)
+    aim = Aim.none(now)
+    line = Path.through([[0, -1.0], [0, 0.3]])
+    aim.speed[:], aim.which[:], aim.arcs[:] = 1.2, 0, line.length - 0.3
+    aim.curves, aim.lengths = Curves([line]), torch.tensor([line.length]).double()
+    for frame in range(5):
+        assert float(aim.wanted(now, frame / 30)[0][0]) == STEPS
+    aim.arcs[:] = line.length - THERE / 2
+    assert float(aim.wanted(now)[0][0]) == 0  # there
+
+
+def test_all_come_to_a_line_s_end_and_stand():
+    model = motionlab.load("lstm-gmm-contacts")
+    eight = LiveControl(model, "stand", 8, futures=4)
+    eight.steer([0.6, 1.2, 1.2, 2.5] * 2, path=Path.through([[0, 0.3], [0, 1.2], [0.5, 2]]))
+    for _ in range(42):
+        eight.go_on()
+    off = eight.going.place[:, :2] - torch.tensor([0.5, 2.0])
+    assert off.norm(dim=1).max() < THERE + 0.05
+    assert eight.going.velocity.norm(dim=1).max() < 0.1
 
 
 def test_a_half_turn_from_a_stand_and_at_half_a_metre_a_second_is_stepped():

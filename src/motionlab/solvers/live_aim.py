@@ -23,7 +23,8 @@ HURRY = 0.8  # m/s more than they go, as an average of 0.3 s has it: people gain
 STARTS = 0.5  # m/s; who is slower, and more than SHARP off, turns before he goes
 STILL = 0.15  # m/s; who is asked for less is asked to stand
 ON_THE_SPOT, NEAR = 0.5, 0.35  # radians off beyond which, and on to which, who stands turns
-BRAKE, THERE = 1.0, 0.25  # 1/s, speed a metre before a place; m from it, where one stands
+BRAKE, THERE = 1.0, 0.15  # 1/s, speed a metre before a place; m from it, where one stands
+STEPS = 0.4  # m/s that are asked for at least until there: a slower stride stops halfway
 BEHIND = 2.6  # radians off, beyond which left and right are as good: the side that is begun stays
 
 
@@ -85,16 +86,19 @@ class Aim:
         """Speed, way and, of those on a path, bend (batch,); else NaN."""
         to = self.target.numpy() - going.place[:, :2]
         far, speed, way = np.hypot(*to.T), self.speed.numpy(), self.direction.numpy()
-        near = np.where(far < THERE, 0.0, np.maximum(BRAKE * far, 2 * STILL))
+        near = np.where(far < THERE, 0.0, np.maximum(BRAKE * far, STEPS))
         aimed = np.isfinite(far)
         speed = np.where(aimed, np.minimum(speed, near), speed)
         way = np.where(aimed & (far > THERE), np.arctan2(*to.T), way)
         bend = np.full_like(way, np.nan)
         if self.curves is not None and (self.which >= 0).any():
             led = self.which >= 0
-            which, arcs = self.which.clamp(min=0), self.arcs + ahead * self.speed
+            # as far on as they went since: at the speed that is asked, who stands short of an end
+            # would be there within each window, and be told to stand
+            which = self.which.clamp(min=0)
+            arcs = self.arcs + torch.from_numpy(ahead * going.pace)
             left = (self.lengths[which] - arcs).numpy()
-            slow = np.where(left < THERE, 0.0, np.maximum(BRAKE * left, 2 * STILL))
+            slow = np.where(left < THERE, 0.0, np.maximum(BRAKE * left, STEPS))
             led = led.numpy()
             speed = np.where(led, np.minimum(speed, slow), speed)
             look = torch.from_numpy((LOOK * speed).clip(min=LEAST_LOOK))
