@@ -80,6 +80,7 @@ class Energy:
             )
         self.model, self.before, self.foretold = model, before, foretold
         self.terms, self.weights = dict(terms or {}), dict(weights or {})
+        self._first: Mixture | None = None
         known = [*OWN, *self.terms]
         for name, weight in self.weights.items():
             if name not in known:
@@ -121,11 +122,17 @@ class Energy:
     def mixture(self, features: Tensor, d: Tensor, before: Before | None = None) -> Mixture:
         """What the network says of each frame of features (batch, frames, dim) before it sees it."""
         state = (self.before if before is None else before).state
-        first = self.model.predict(state)
+        first = self._foretold_first() if before is None else self.model.predict(state)
         if features.shape[1] == 1:
             return Mixture(*(part[:, None] for part in first))
         rest, _ = self.model.read(features[:, :-1], state, d[:, :-1])
         return Mixture(*(torch.cat([a[:, None], b], 1) for a, b in zip(first, rest, strict=True)))
+
+    def _foretold_first(self) -> Mixture:
+        """What the network says of the first frames, which no search changes: asked once."""
+        if self._first is None:
+            self._first = self.model.predict(self.before.state)
+        return self._first
 
     def decoded(
         self,
