@@ -12,6 +12,7 @@ from ..encodings import JointAngles
 from ..feet.lock_stream import LockStream
 from ..metrics import broken
 from ..models import Refiner
+from ..models.refiner_step import MOST
 from ..motion import Motion
 
 
@@ -66,8 +67,8 @@ class Behind:
 
     def _refined(self, frames: Tensor) -> Tensor:
         found = []
-        for frame in frames.split(1, 1):  # one at a time is its fastest
-            refined, self.state = self.refiner.refine(frame, self.state)
+        for some in frames.split(MOST, 1):  # more at a time go another, slower way
+            refined, self.state = self.refiner.refine(some, self.state)
             found.append(refined)
         features = torch.cat(found, 1)
         return broken.within(self.encoding, features) if self.known else features
