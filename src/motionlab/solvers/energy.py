@@ -21,6 +21,7 @@ from torch import Tensor
 from ..encodings import JointAngles
 from ..errors import SolverError
 from ..models import LstmGmm, Mixture, State
+from .live_slope import points_with_slope
 from .terms import Term
 
 NOISE = 0.05  # σ of d in normalised units, the paper's and the training's
@@ -146,7 +147,11 @@ class Energy:
         """
         before, encoding = self.before if before is None else before, self.model.encoding
         features = torch.cat([before.frame[:, None], features], dim=1)
-        some = {"points": points} if isinstance(encoding, JointAngles) else {}
-        positions = encoding.positions(features, before.place, **some)
+        positions, some = None, {}
+        if isinstance(encoding, JointAngles):
+            some = {"points": points}
+            positions = points_with_slope(encoding, features, before.place, points)
+        if positions is None:
+            positions = encoding.positions(features, before.place, **some)
         has = "contacts" in encoding.slices
         return features, positions, encoding.contacts(features) if has else None
