@@ -13,7 +13,7 @@ from torch import Tensor
 from ..encodings import JointAngles
 from ..encodings.effectors import chain_ends
 from ..models.refiner_step import turns_of
-from .live_points import FeetPoints, feet_of
+from .live_points import FeetPoints, feet_of, led, way_of
 
 ROWS = 64  # frames of all windows together; torch is faster with more
 SMALL = 0.02  # radians, below which a rotation's slope is that of its series
@@ -48,14 +48,8 @@ class _Points(torch.autograd.Function):
         ctx.turns = turns_of(ctx.vectors, feet.mean.astype(float))
         ends = chain_ends(ctx.turns, feet.levels, feet.offsets).transpose(2, 0, 1)
         ctx.ends = ends.reshape(batch, frames, -1, 3)  # seen from the root, in its heading
-        turned = np.concatenate([place[:, 2:], rows[:, 1:, 2]], 1)
-        ctx.yaw = turned.cumsum(1)
-        ctx.steps = rows[:, 1:, :2]
-        x, z = _led(ctx.steps, ctx.yaw[:, :-1])
-        root = np.stack([x, np.zeros_like(x), z], -1)
-        root = np.concatenate([place[:, None, [0, 0, 1]] * [1, 0, 1], root], 1).cumsum(1)
-        root[..., 1] = rows[..., 3]
-        x, z = _led(ctx.ends[..., [0, 2]], ctx.yaw[..., None])
+        root, ctx.yaw = way_of(rows, place)
+        x, z = led(ctx.ends[..., [0, 2]], ctx.yaw[..., None])
         found = np.full((batch, frames, feet.encoding.points, 3), np.nan, np.float32)
         found[:, :, 0] = root
         found[:, :, feet.feet] = np.stack([x, ctx.ends[..., 1], z], -1) + root[:, :, None]
@@ -74,7 +68,7 @@ class _Points(torch.autograd.Function):
             of_feet[..., [0, 2]], ctx.ends[..., [0, 2]], ctx.yaw[..., None]
         )
         of_yaw = sideways.sum(2)
-        sideways, slope[:, 1:, :2] = _led_slope(later, ctx.steps, ctx.yaw[:, :-1])
+        sideways, slope[:, 1:, :2] = _led_slope(later, ctx.rows[:, 1:, :2], ctx.yaw[:, :-1])
         of_yaw[:, :-1] += sideways
         slope[:, 1:, 2] = of_yaw[:, :0:-1].cumsum(1)[:, ::-1]
         of_ends = np.stack([of_ends[..., 0], of_feet[..., 1], of_ends[..., 1]], -1)
@@ -87,19 +81,12 @@ class _Points(torch.autograd.Function):
         return torch.from_numpy(slope.astype(np.float32)), None, None
 
 
-def _led(steps: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """x and z (...) of what is to the left and ahead (..., 2) of who faces that way."""
-    sine, cosine = np.sin(yaw), np.cos(yaw)
-    left, ahead = steps[..., 0], steps[..., 1]
-    return left * cosine + ahead * sine, ahead * cosine - left * sine
-
-
 def _led_slope(
     blame: np.ndarray, steps: np.ndarray, yaw: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Blame of yaw (...) and of steps (..., 2), from that of x and z (..., 2)."""
-    x, z = _led(steps, yaw)
-    back = _led(blame, -yaw)
+    x, z = led(steps, yaw)
+    back = led(blame, -yaw)
     return blame[..., 0] * z - blame[..., 1] * x, np.stack(back, -1)
 
 
