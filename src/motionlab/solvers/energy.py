@@ -123,16 +123,20 @@ class Energy:
     def mixture(self, features: Tensor, d: Tensor, before: Before | None = None) -> Mixture:
         """What the network says of each frame of features (batch, frames, dim) before it sees it."""
         state = (self.before if before is None else before).state
-        first = self._foretold_first() if before is None else self.model.predict(state)
+        first = self._foretold_first(state)
         if features.shape[1] == 1:
             return Mixture(*(part[:, None] for part in first))
         rest, _ = self.model.read(features[:, :-1], state, d[:, :-1])
         return Mixture(*(torch.cat([a[:, None], b], 1) for a, b in zip(first, rest, strict=True)))
 
-    def _foretold_first(self) -> Mixture:
-        """What the network says of the first frames, which no search changes: asked once."""
+    def _foretold_first(self, state: State) -> Mixture:
+        """What the network says of the first frames; of the energy's own, which no search changes, once."""
+        own = state is self.before.state and not any(part.requires_grad for part in state)
+        if not own:
+            return self.model.predict(state)
         if self._first is None:
-            self._first = self.model.predict(self.before.state)
+            with torch.no_grad():
+                self._first = self.model.predict(state)
         return self._first
 
     def decoded(
