@@ -152,6 +152,24 @@ def test_an_hour_without_a_command_is_remembered_in_part_only(walker):
     assert one.record()["seconds since asked"] == pytest.approx(40 / 30)
 
 
+@pytest.mark.slow
+def test_who_is_told_nothing_stands_on_or_walks_on():
+    """For 2 000 frames. The stander crept at 0.4 m/s, since his last step had swayed."""
+    model = motionlab.load("lstm-gmm-contacts")
+    two, paces = LiveControl(model, ["stand", "walk"], 2, way="push"), []
+    for _ in range(400):
+        motions = two.go_on()
+        paces.append(two.going.velocity.norm(dim=1))
+        for motion in motions:
+            assert motion.rotations.isfinite().all()
+    assert two.lost == [0, 0]
+    stands, walks = torch.stack(paces[100:]).unbind(1)
+    assert stands.max() < 0.05
+    assert (walks.mean() / two.aim.speed[1] - 1).abs() < 0.1 and walks.min() > 0.5
+    for i in range(2):
+        assert metrics.broken_frames(two.motion(i)).double().mean() < 0.01
+
+
 def test_time_that_is_up_ends_the_search_with_the_best_there_is(walker):
     hurried = live(walker, futures=64, seconds=1e-6)
     hurried.go_on()
@@ -229,6 +247,11 @@ def test_the_aim_asks_for_what_bodies_can_do():
     assert aimed(going(speed=1.2), 3.0, 0.0)[0] == pytest.approx(1.2 + HURRY)
     assert aimed(going(speed=3.0), 0.0, 0.0)[0] == 0.0  # who is asked to stand does not wait
     assert aimed(going(speed=0.0), 1.2, 0.0)[0] > 0.15
+
+
+def test_who_is_told_nothing_is_asked_for_his_pace_and_to_stand_if_he_hardly_moves():
+    assert Aim.none(going(speed=0.2)).speed.tolist() == [0.0]
+    assert Aim.none(going(speed=1.2)).speed.tolist() == [pytest.approx(1.2)]
 
 
 def test_who_stands_turns_on_the_spot_only_when_it_is_worth_it():

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from ..paths import Curves
-from .guided import LEAST_LOOK, LOOK, Going
+from .guided import LEAST_LOOK, LOOK, STANDING, Going
 from .live_going import Rows, wrapped
 
 GAIN = 3.0  # rad/s that are asked for a radian off the way
@@ -49,9 +49,9 @@ class Aim:
 
     @classmethod
     def none(cls, going: Going) -> Aim:
-        """To go on as they go."""
+        """To go on as they go; who hardly moves, to stand: a stander's sway is no wish to creep."""
         pace, nowhere = going.velocity.norm(dim=1), torch.full_like(going.velocity, torch.nan)
-        nobody = torch.full((len(pace),), -1)
+        pace, nobody = torch.where(pace < STANDING, 0.0, pace), torch.full((len(pace),), -1)
         return cls(pace, going.bearing(), nowhere, nobody, torch.zeros_like(pace))
 
     def __getitem__(self, rows: Tensor) -> Aim:

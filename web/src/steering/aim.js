@@ -30,9 +30,9 @@ export class Aim {
     Object.assign(this, { speed, direction, path, arc });
   }
 
-  /** Nobody has asked for anything: he goes on as he goes. */
+  /** Nobody has asked for anything: he goes on as he goes; who hardly moves, stands: a stander's sway is no wish to creep. */
   static none(going) {
-    return new Aim(going.pace, going.bearing);
+    return new Aim(going.pace < STANDING ? 0 : going.pace, going.bearing);
   }
 
   copy() {
