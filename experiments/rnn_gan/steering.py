@@ -46,6 +46,8 @@ SOUGHT, AHEAD, STRAIGHT = (
 WALK, RUN, SLOW, FAST = 1.2, 2.8, 0.9, 1.4  # m/s
 OURS = "futures"
 WAYS = {"push": {}, "gradient": {"futures": 4}}  # beside ours, on few scripts and seeds
+SPEEDS = {"push": {"way": "push"}, "futures, K 4": {"futures": 4}, "futures, K 16": {},
+          "futures, K 64": {"futures": 64}, "gradient": {"way": "gradient", "futures": 4}}  # fmt: skip
 FEW = ("90° left", "179° left", "walk, run, walk", "stop")
 FEW_SEEDS = 5
 
@@ -186,13 +188,15 @@ def of_script(
 
 
 def played(
-    script: Script, model: nn.Module, refiner: nn.Module, begun, way: str, seeds: int
+    script: Script, model: nn.Module, refiner: nn.Module, begun, way: str, seeds: int,
+    settings: dict | None = None,
 ) -> dict[str, tuple[Motion, dict]]:  # fmt: skip
     """All seeds and starts of a script, as one batch; refined and locked as they come."""
+    settings = WAYS.get(way, {}) if settings is None else settings
     begin_from(model, begun)
     count = seeds * BEGINS
     live = LiveControl(
-        model, [i % BEGINS for i in range(count)], count, way=way, refiner=refiner, lock=True, **WAYS.get(way, {})
+        model, [i % BEGINS for i in range(count)], count, way=way, refiner=refiner, lock=True, **settings
     )  # fmt: skip
     begin = time.process_time()
     obey(live, script.commands, script.seconds)
@@ -346,8 +350,13 @@ def survival(model: nn.Module, begun, seeds: int, minutes: float, seed: int = 0)
 
 
 @torch.no_grad()
-def speed(model: nn.Module, refiner: nn.Module, windows: int = 60) -> dict:
-    """Frames a processor second of one character on one thread, and seconds a window."""
+def speed(
+    model: nn.Module, refiner: nn.Module, windows: int = 60, each: dict[str, dict] = SPEEDS
+) -> dict:  # fmt: skip
+    """Frames a processor second of one character on one thread, and seconds a window.
+
+    each : by name, settings of a `LiveControl`.
+    """
     found = {}
     model = motionlab.load(NAME)
     begin = time.process_time()
@@ -355,8 +364,6 @@ def speed(model: nn.Module, refiner: nn.Module, windows: int = 60) -> dict:
         300, model.starts[:1], generator=torch.Generator().manual_seed(0), **model.sampling
     )
     found["free"] = {"frames a second": 300 / (time.process_time() - begin)}
-    each = {"push": {"way": "push"}, "futures, K 4": {"futures": 4}, "futures, K 16": {},
-            "futures, K 64": {"futures": 64}, "gradient": {"way": "gradient", "futures": 4}}  # fmt: skip
     for name, settings in each.items():
         live = LiveControl(model, "walk", refiner=refiner, lock=True, **settings)
         live.steer(WALK, 0.5)

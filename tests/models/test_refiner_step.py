@@ -1,4 +1,4 @@
-"""One frame in numpy against the whole motion in torch."""
+"""One frame in numpy, or a few, against the whole motion in torch."""
 
 import copy
 import math
@@ -12,7 +12,7 @@ from motionlab.encodings import JointAngles, Normalizer
 from motionlab.errors import ModelError, MotionLabError
 from motionlab.models import Refiner
 from motionlab.models.refiner import effector_normalizer
-from motionlab.models.refiner_step import step
+from motionlab.models.refiner_step import MOST, step
 
 FRAMES = 40
 KINDS = {
@@ -41,16 +41,16 @@ def make(contacts=False, rotation="vector", **settings):
     return refiner, torch.stack(clips)
 
 
-def frame_by_frame(refiner, features):
+def frame_by_frame(refiner, features, count=1):
     state, pieces = None, []
-    for frame in features.split(1, dim=1):
+    for frame in features.split(count, dim=1):
         piece, state = refiner.refine(frame, state)
         pieces.append(piece)
     return torch.cat(pieces, dim=1), state
 
 
-def assert_same(refiner, features, tolerance=2e-5):
-    found, state = frame_by_frame(refiner, features)
+def assert_same(refiner, features, tolerance=2e-5, count=1):
+    found, state = frame_by_frame(refiner, features, count)
     whole, end = refiner.refine(features)
     normal, close = refiner.normalizer, {"rtol": 1e-5, "atol": tolerance}
     torch.testing.assert_close(normal(found), normal(whole), **close)
@@ -68,6 +68,16 @@ def test_a_stream_of_frames_is_the_whole(world):
     assert_same(refiner, features[1:2])
     with torch.inference_mode():
         assert_same(refiner, features)
+
+
+@pytest.mark.parametrize("count", [2, 5, MOST])
+@torch.no_grad()
+def test_so_is_a_stream_of_windows(world, count):
+    refiner, features = world
+    assert step(refiner, features[:, :count], None)
+    assert step(refiner, features[:, : MOST + 1], None) is None
+    assert_same(refiner, features, count=count)
+    assert_same(refiner, features[1:2], count=count)
 
 
 @torch.no_grad()

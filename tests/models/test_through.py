@@ -38,3 +38,13 @@ def test_weights_get_no_gradient():
     inputs = torch.randn(5, 2, 3, requires_grad=True)
     through(lstm, inputs, zero, zero)[0].sum().backward()
     assert inputs.grad.abs().sum() > 0 and lstm.weight_ih_l0.grad is None
+
+
+def test_weights_that_change_are_heard():
+    lstm, zero, inputs = nn.LSTM(3, 4), torch.zeros(1, 2, 4), torch.randn(5, 2, 3)
+    with torch.no_grad():
+        first = through(lstm, inputs, zero, zero)[0]
+        lstm.weight_hh_l0.mul_(-1)
+        second = through(lstm, inputs, zero, zero)[0]
+        assert not torch.allclose(first, second)
+        torch.testing.assert_close(second, lstm(inputs, (zero, zero))[0])

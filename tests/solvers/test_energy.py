@@ -294,3 +294,20 @@ def test_a_model_without_contacts_is_asked_for_them(window, clips):
     assert left_out(
         model.normalizer(rows[None, 5:9]), torch.zeros(1, 4, encoding.dim).double()
     ).isfinite()
+
+
+def test_what_is_said_of_first_frames_is_asked_once_where_nobody_seeks_them(network, window):
+    before, s, d = window
+    energy = Energy(network, before)
+    asked = []
+    said = network.predict
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(network, "predict", lambda state: asked.append(state) or said(state))
+        first, again = energy(s, d), energy(s, d)
+        assert torch.equal(first, again) and len(asked) == 1
+        hidden = (before.state.hidden + 0.1).requires_grad_()
+        other = before._replace(state=before.state._replace(hidden=hidden))
+        for _ in range(2):
+            (slope,) = torch.autograd.grad(energy(s, d, other).sum(), hidden)
+            assert slope.abs().sum() > 0
+        assert len(asked) == 3

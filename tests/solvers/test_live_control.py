@@ -11,9 +11,9 @@ from motionlab import metrics
 from motionlab.errors import SolverError
 from motionlab.metrics import broken
 from motionlab.motion import concatenate
-from motionlab.paths import Path
+from motionlab.paths import Curves, Path
 from motionlab.solvers.guided import Going
-from motionlab.solvers.live_aim import BEND, HURRY, SIDEWAYS, SLOWED, Aim
+from motionlab.solvers.live_aim import BEND, HURRY, SIDEWAYS, SLOWED, STEPS, THERE, Aim
 from motionlab.solvers.live_control import LiveControl
 from motionlab.solvers.live_feet import Behind
 from motionlab.solvers.live_frame import slowest_foot
@@ -152,6 +152,24 @@ def test_an_hour_without_a_command_is_remembered_in_part_only(walker):
     assert one.record()["seconds since asked"] == pytest.approx(40 / 30)
 
 
+@pytest.mark.slow
+def test_who_is_told_nothing_stands_on_or_walks_on():
+    """For 2 000 frames. The stander crept at 0.4 m/s, since his last step had swayed."""
+    model = motionlab.load("lstm-gmm-contacts")
+    two, paces = LiveControl(model, ["stand", "walk"], 2, way="push"), []
+    for _ in range(400):
+        motions = two.go_on()
+        paces.append(two.going.velocity.norm(dim=1))
+        for motion in motions:
+            assert motion.rotations.isfinite().all()
+    assert two.lost == [0, 0]
+    stands, walks = torch.stack(paces[100:]).unbind(1)
+    assert stands.max() < 0.05
+    assert (walks.mean() / two.aim.speed[1] - 1).abs() < 0.1 and walks.min() > 0.5
+    for i in range(2):
+        assert metrics.broken_frames(two.motion(i)).double().mean() < 0.01
+
+
 def test_time_that_is_up_ends_the_search_with_the_best_there_is(walker):
     hurried = live(walker, futures=64, seconds=1e-6)
     hurried.go_on()
@@ -231,6 +249,11 @@ def test_the_aim_asks_for_what_bodies_can_do():
     assert aimed(going(speed=0.0), 1.2, 0.0)[0] > 0.15
 
 
+def test_who_is_told_nothing_is_asked_for_his_pace_and_to_stand_if_he_hardly_moves():
+    assert Aim.none(going(speed=0.2)).speed.tolist() == [0.0]
+    assert Aim.none(going(speed=1.2)).speed.tolist() == [pytest.approx(1.2)]
+
+
 def test_who_stands_turns_on_the_spot_only_when_it_is_worth_it():
     assert aimed(going(speed=0.0), 0.0, 0.3)[1] == 0
     assert aimed(going(speed=0.0), 0.0, 1.0)[1] > 0
@@ -244,6 +267,30 @@ def test_who_stands_turns_before_he_goes_and_who_is_slow_goes_where_he_faces():
     assert aimed(faces, 0.5, math.pi / 2)[2] == pytest.approx(math.pi / 2)
     faces.velocity = 4 * faces.velocity  # who walks goes his way, however he faces
     assert aimed(faces, 1.2, math.pi / 2)[2] == pytest.approx(0)
+
+
+def test_who_stands_short_of_a_line_s_end_is_asked_for_steps_in_all_frames_of_a_window():
+    """And not to stand in its last ones, as if he had gone on meanwhile: he stood there for ever."""
+    now = going(speed=0.02)
+    aim = Aim.none(now)
+    line = Path.through([[0, -1.0], [0, 0.3]])
+    aim.speed[:], aim.which[:], aim.arcs[:] = 1.2, 0, line.length - 0.3
+    aim.curves, aim.lengths = Curves([line]), torch.tensor([line.length]).double()
+    for frame in range(5):
+        assert float(aim.wanted(now, frame / 30)[0][0]) == STEPS
+    aim.arcs[:] = line.length - THERE / 2
+    assert float(aim.wanted(now)[0][0]) == 0  # there
+
+
+def test_all_come_to_a_line_s_end_and_stand():
+    model = motionlab.load("lstm-gmm-contacts")
+    eight = LiveControl(model, "stand", 8, futures=4)
+    eight.steer([0.6, 1.2, 1.2, 2.5] * 2, path=Path.through([[0, 0.3], [0, 1.2], [0.5, 2]]))
+    for _ in range(42):
+        eight.go_on()
+    off = eight.going.place[:, :2] - torch.tensor([0.5, 2.0])
+    assert off.norm(dim=1).max() < THERE + 0.05
+    assert eight.going.velocity.norm(dim=1).max() < 0.1
 
 
 def test_a_half_turn_from_a_stand_and_at_half_a_metre_a_second_is_stepped():

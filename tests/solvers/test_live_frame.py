@@ -7,6 +7,7 @@ import pytest
 import torch
 from tiny_lstm import tiny_clips, tiny_lstm
 
+from motionlab.encodings import JointAngles
 from motionlab.solvers.energy import Before
 from motionlab.solvers.guided import Going
 from motionlab.solvers.live_control import LiveControl
@@ -27,7 +28,7 @@ from motionlab.solvers.live_frame import (
     stood,
 )  # fmt: skip
 from motionlab.solvers.live_going import Rows
-from motionlab.solvers.live_points import FeetPoints
+from motionlab.solvers.live_points import FeetPoints, rotations_of
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +84,18 @@ def test_feet_of_futures_are_where_the_encoding_has_them(walker):
     found = feet(features, np.stack(places, 1))
     torch.testing.assert_close(found[:, :, feet.feet], there[:, :, feet.feet], atol=1e-5, rtol=0)
     assert found[:, :, 0].isnan().all()  # nobody looks at the root
+
+
+@pytest.mark.parametrize("rotation", ["vector", "6d"])
+def test_bodies_of_a_window_stand_as_the_encoding_has_them(walker, rotation):
+    (clip,) = tiny_clips("walk_0.8_turn_left_0.5")
+    encoding = JointAngles(clip.skeleton, clip.fps, rotation=rotation)
+    features = encoding.encode(clip)[4:28].reshape(2, 12, -1)
+    start = torch.tensor([[1.0, 2.0, 0.5], [0.0, -1.0, 3.0]]).double()
+    for theirs, ours in zip(
+        encoding.rotations(features, start), rotations_of(encoding, features, start), strict=True
+    ):
+        torch.testing.assert_close(ours, theirs.float(), atol=2e-6, rtol=0)
 
 
 @pytest.mark.parametrize("size", [1.0, 8.0, 1e6])

@@ -27,6 +27,7 @@ from .through import through
 # value could be made as narrow, and its density as high, as one likes. With 0.1 a contact that the
 # network was sure of and got wrong costs about 200 nats.
 _FLOOR, _CONTACT_FLOOR = 0.01, 0.1
+BRIEF = 8  # frames that `through` reads in less time than torch's LSTM needs to begin
 
 
 class Mixture(NamedTuple):
@@ -200,7 +201,10 @@ class LstmGmm(Recurrent):
             state.hidden.transpose(0, 1).contiguous(),
             state.cell.transpose(0, 1).contiguous(),
         )
-        if torch.is_grad_enabled() and not any(w.requires_grad for w in self.lstm.parameters()):
+        graded = torch.is_grad_enabled()
+        learns = graded and any(w.requires_grad for w in self.lstm.parameters())
+        # torch's own brings all weights into an order of its own each time, for a few frames in vain
+        if (graded or inputs.shape[1] <= BRIEF) and not learns:
             frames_first = inputs.transpose(0, 1).contiguous()
             outputs, hidden, cell = through(self.lstm, self.enter(frames_first), *memory)
             outputs = outputs.transpose(0, 1).contiguous()

@@ -1,8 +1,9 @@
-"""`Refiner.refine` of one frame, calculated in numpy, for characters that are followed as they move.
+"""`Refiner.refine` of a few frames, calculated in numpy, for characters that are followed as they move.
 
 The same network. One frame of one character is little to calculate in two hundred pieces, and torch
-takes some microseconds to begin with any of them, numpy a fraction. Whole motions, gradients, other
-devices and other rotations than vectors go the way of refiner.py.
+takes some microseconds to begin with any of them, numpy a fraction. What does not wait for the frame before
+is calculated for all frames at once. Whole motions, gradients, other devices and other rotations than
+vectors go the way of refiner.py.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from ..encodings import Normalizer
     from .refiner import Refiner
 
+MOST = 8  # frames; torch, which knows of many, is faster with more
 _TINY = 1e-6  # radians; a smaller angle is as good as its sine
 # vector (3) to the matrix, row by row, that takes the cross product with it from the left
 _CROSS = np.zeros((9, 3), np.float32)
@@ -29,7 +31,7 @@ _CROSS[[7, 2, 3], [0, 1, 2]], _CROSS[[5, 6, 1], [0, 1, 2]] = 1, -1
 
 
 def step(refiner: Refiner, features: Tensor, state: State | None) -> tuple[Tensor, State] | None:
-    """`Refiner.refine`, if it is asked for one frame of each motion, and for no gradient.
+    """`Refiner.refine`, if it is asked for few frames of each motion, and for no gradient.
 
     Else, and if anything at all is wrong with what was given, None: refiner.py knows what to say.
     """
@@ -40,27 +42,28 @@ def step(refiner: Refiner, features: Tensor, state: State | None) -> tuple[Tenso
         given = network and _arrays(refiner, features, state)
         if not given:
             return None
-        refined, hidden, cell = (torch.from_numpy(part[:, None]) for part in network(*given))
-    return refined, State(features[:, 0], hidden, cell)
+        refined, hidden, cell = (torch.from_numpy(part) for part in network(*given))
+    return refined, State(features[:, -1], hidden[:, None], cell[:, None])
 
 
 def _arrays(refiner: Refiner, features: Tensor, state: State | None) -> list[np.ndarray] | None:
-    """A frame and the one before it (batch, dim), h and C (batch, width); None if they aren't sound."""
-    if not torch.is_tensor(features) or features.ndim != 3:
+    """Frames (batch, frames, dim) and the one before them (batch, dim), h and C (batch, width); None if
+    they aren't sound."""
+    if not torch.is_tensor(features) or features.ndim != 3 or not 1 <= features.shape[1] <= MOST:
         return None
-    batch, dim, width = len(features), refiner.encoding.dim, refiner.width
+    (batch, frames, _), dim, width = features.shape, refiner.encoding.dim, refiner.width
     if state is None:
         memory = torch.zeros(batch, 1, width)
         state = State(features[:, 0], memory, memory)
     elif not isinstance(state, State) or state.noise.shape[-1] or state.seen.shape[-1]:
         return None
-    shapes = (batch, 1, dim), (batch, dim), (batch, 1, width), (batch, 1, width)
+    shapes = (batch, frames, dim), (batch, dim), (batch, 1, width), (batch, 1, width)
     given = features, state.frame, state.hidden, state.cell
     arrays = [_array_of(*pair) for pair in zip(given, shapes, strict=True)]
     if any(array is None for array in arrays):
         return None
     now, before, hidden, cell = arrays
-    return [now[:, 0], before, hidden[:, 0], cell[:, 0]]
+    return [now, before, hidden[:, 0], cell[:, 0]]
 
 
 def _array_of(tensor: Tensor, shape: tuple[int, ...]) -> np.ndarray | None:
@@ -76,7 +79,7 @@ def _plain(tensor: Tensor) -> bool:
 
 
 class _Step:
-    """The network's weights as arrays, and what it does with a frame."""
+    """The network's weights as arrays, and what it does with frames."""
 
     @classmethod
     def of(cls, refiner: Refiner) -> _Step | None:
@@ -110,32 +113,41 @@ class _Step:
     def __call__(
         self, now: np.ndarray, before: np.ndarray, hidden: np.ndarray, cell: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Refined frame (batch, dim), h and C (batch, width)."""
-        mean, std = self.normal
+        """Refined frames (batch, frames, dim), h and C (batch, width) after them.
+
+        now : (batch, frames, dim), raw units; before : (batch, dim), the frame before them.
+        """
+        shape, (mean, std) = now.shape, self.normal
+        earlier = np.concatenate([before[:, None], now[:, :-1]], 1).reshape(-1, shape[2])
+        now = now.reshape(-1, shape[2])  # (rows, dim): frame after frame of each
         normalized = (now[:, self.kept] - mean) / std
-        entered = _through(self.enter, np.concatenate([normalized, *self._felt(now, before)], 1))
-        gates = np.concatenate([np.maximum(entered, 0), hidden], 1)
-        gates = np.tanh(_through(self.gates, gates)).reshape(len(now), 4, -1)
-        enter, keep, new, show = (gates[:, i] for i in range(4))
-        cell = ((1 + keep) * cell + (1 + enter) * new) / 2
-        after = (1 + show) * np.tanh(cell) / 2
+        entered = _through(self.enter, np.concatenate([normalized, *self._felt(now, earlier)], 1))
+        entered = np.maximum(entered, 0).reshape(*shape[:2], -1)
+        felt = [hidden]
+        for t in range(shape[1]):
+            gates = np.concatenate([entered[:, t], felt[-1]], 1)
+            gates = np.tanh(_through(self.gates, gates)).reshape(shape[0], 4, -1)
+            enter, keep, new, show = (gates[:, i] for i in range(4))
+            cell = ((1 + keep) * cell + (1 + enter) * new) / 2
+            felt.append((1 + show) * np.tanh(cell) / 2)
+        was, after = (np.stack(part, 1).reshape(len(now), -1) for part in (felt[:-1], felt[1:]))
         refined = np.repeat(self.mean[None], len(now), 0)
         refined[:, self.kept] = (normalized + _through(self.leave, after)) * std + mean
         if self.reach is not None:
-            refined[:, :3] = self._steps(now, hidden, after)
-        return refined, after, cell
+            refined[:, :3] = self._steps(now, was, after)
+        return refined.reshape(shape), felt[-1], cell
 
     def _felt(self, now: np.ndarray, before: np.ndarray) -> list[np.ndarray]:
-        """What the network sees of end effectors (batch, numbers), see `refiner._felt`."""
+        """What the network sees of end effectors (rows, numbers), see `refiner._felt`."""
         mean, std = self.effectors
-        moving = self._moving(now, before)  # (batch, effectors, 6)
+        moving = self._moving(now, before)  # (rows, effectors, 6)
         felt = [(moving.reshape(len(now), -1) - mean) / std]
         if self.slow is not None:
             felt.append(np.arcsinh(moving[:, :2, 3:] / np.float32(self.slow)).reshape(len(now), -1))
         return felt
 
     def _moving(self, now: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """End effectors (batch, effectors, 6) as `JointAngles.end_effectors` gives them."""
+        """End effectors (rows, effectors, 6) as `JointAngles.end_effectors` gives them."""
         both = np.concatenate([before, now]).T  # (dim, batch): kinematics take batches last
         local = turns_of(both.take(self.vectors, 0).reshape(-1, 3, both.shape[1]), self.mean_pose)
         points = chain_ends(local, self.levels, self.offsets)  # (effectors, 3, batch)
@@ -152,7 +164,7 @@ class _Step:
         return np.concatenate([now, np.float32(self.fps) * moved], 1).transpose(2, 0, 1)
 
     def _steps(self, now: np.ndarray, hidden: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Steps and turns (batch, 3) of a tethered root, see `Refiner._steps`."""
+        """Steps and turns (rows, 3) of a tethered root, see `Refiner._steps`."""
         offsets = np.float32(self.reach) * np.tanh(
             _through(self.aside, np.concatenate([hidden, after]))
         )

@@ -13,6 +13,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from .unchanged import made_of
+
 
 def through(
     lstm: nn.LSTM, inputs: Tensor, hidden: Tensor, cell: Tensor
@@ -30,26 +32,34 @@ def through(
     outputs (frames, batch, width), and hidden and cell (layers, batch, width) after the last frame.
     """
     after = []
-    for layer, (of_input, of_hidden, bias, bias_too) in enumerate(lstm.all_weights):
-        weights = of_input.detach(), of_hidden.detach(), (bias + bias_too).detach()
+    for layer, weights in enumerate(made_of(lstm, "through", lambda: _weights(lstm))):
         inputs, last = _Layer.apply(inputs, hidden[layer], cell[layer], *weights)
         after.append((inputs[-1], last))
     return inputs, *(torch.stack(part) for part in zip(*after, strict=True))
 
 
+@torch.no_grad()
+def _weights(lstm: nn.LSTM) -> list[tuple[Tensor, Tensor, Tensor, Tensor]]:
+    """Of each layer those of its input, those of h, these as the product reads them, and biases."""
+    found = []
+    for of_input, of_hidden, bias, bias_too in lstm.all_weights:
+        across = of_hidden.T.contiguous()
+        width = len(across)
+        across[:, 2 * width : 3 * width].mul_(2)  # see `_Layer.forward`
+        found.append((of_input.detach(), of_hidden.detach(), across, bias + bias_too))
+    return found
+
+
 class _Layer(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, inputs, hidden, cell, of_input, of_hidden, bias):
+    def forward(ctx, inputs, hidden, cell, of_input, of_hidden, across, bias):
         frames, batch, width = len(inputs), inputs.shape[1], hidden.shape[1]
         gates = torch.addmm(bias, inputs.flatten(0, 1), of_input.T).view(frames, batch, 4 * width)
         cells = cell.new_empty(frames + 1, batch, width)
         bent, outputs = cell.new_empty(2, frames, batch, width)
         cells[0] = cell
         # one sigmoid does for all four: tanh(x) = 2 sigmoid(2 x) - 1 is the third's
-        third = slice(2 * width, 3 * width)
-        across = of_hidden.T.contiguous()
-        for part in (gates, across):
-            part[..., third].mul_(2)
+        gates[..., 2 * width : 3 * width].mul_(2)
         enter, keep, new, show = _four(gates)
         new = new.unbind()
         for t in range(frames):
@@ -86,7 +96,7 @@ class _Layer(torch.autograd.Function):
             to_hidden = blame[t] @ of_hidden
             to_cell.mul_(keep[t])
         to_inputs = (blame.flatten(0, 1) @ of_input).view(*blame.shape[:2], -1)
-        return to_inputs, to_hidden, to_cell, None, None, None
+        return to_inputs, to_hidden, to_cell, None, None, None, None
 
 
 def _four(gates: Tensor) -> tuple[Tensor, ...]:

@@ -21,6 +21,7 @@ from torch import Tensor
 from ..encodings import JointAngles
 from ..errors import SolverError
 from ..models import LstmGmm, Mixture, State
+from .live_slope import points_with_slope
 from .terms import Term
 
 NOISE = 0.05  # σ of d in normalised units, the paper's and the training's
@@ -80,6 +81,7 @@ class Energy:
             )
         self.model, self.before, self.foretold = model, before, foretold
         self.terms, self.weights = dict(terms or {}), dict(weights or {})
+        self._first: Mixture | None = None
         known = [*OWN, *self.terms]
         for name, weight in self.weights.items():
             if name not in known:
@@ -121,11 +123,21 @@ class Energy:
     def mixture(self, features: Tensor, d: Tensor, before: Before | None = None) -> Mixture:
         """What the network says of each frame of features (batch, frames, dim) before it sees it."""
         state = (self.before if before is None else before).state
-        first = self.model.predict(state)
+        first = self._foretold_first(state)
         if features.shape[1] == 1:
             return Mixture(*(part[:, None] for part in first))
         rest, _ = self.model.read(features[:, :-1], state, d[:, :-1])
         return Mixture(*(torch.cat([a[:, None], b], 1) for a, b in zip(first, rest, strict=True)))
+
+    def _foretold_first(self, state: State) -> Mixture:
+        """What the network says of the first frames; of the energy's own, which no search changes, once."""
+        own = state is self.before.state and not any(part.requires_grad for part in state)
+        if not own:
+            return self.model.predict(state)
+        if self._first is None:
+            with torch.no_grad():
+                self._first = self.model.predict(state)
+        return self._first
 
     def decoded(
         self,
@@ -139,7 +151,11 @@ class Energy:
         """
         before, encoding = self.before if before is None else before, self.model.encoding
         features = torch.cat([before.frame[:, None], features], dim=1)
-        some = {"points": points} if isinstance(encoding, JointAngles) else {}
-        positions = encoding.positions(features, before.place, **some)
+        positions, some = None, {}
+        if isinstance(encoding, JointAngles):
+            some = {"points": points}
+            positions = points_with_slope(encoding, features, before.place, points)
+        if positions is None:
+            positions = encoding.positions(features, before.place, **some)
         has = "contacts" in encoding.slices
         return features, positions, encoding.contacts(features) if has else None

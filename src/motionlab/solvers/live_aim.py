@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from ..paths import Curves
-from .guided import LEAST_LOOK, LOOK, Going
+from .guided import LEAST_LOOK, LOOK, STANDING, Going
 from .live_going import Rows, wrapped
 
 GAIN = 3.0  # rad/s that are asked for a radian off the way
@@ -23,7 +23,8 @@ HURRY = 0.8  # m/s more than they go, as an average of 0.3 s has it: people gain
 STARTS = 0.5  # m/s; who is slower, and more than SHARP off, turns before he goes
 STILL = 0.15  # m/s; who is asked for less is asked to stand
 ON_THE_SPOT, NEAR = 0.5, 0.35  # radians off beyond which, and on to which, who stands turns
-BRAKE, THERE = 1.0, 0.25  # 1/s, speed a metre before a place; m from it, where one stands
+BRAKE, THERE = 1.0, 0.15  # 1/s, speed a metre before a place; m from it, where one stands
+STEPS = 0.4  # m/s that are asked for at least until there: a slower stride stops halfway
 BEHIND = 2.6  # radians off, beyond which left and right are as good: the side that is begun stays
 
 
@@ -48,9 +49,9 @@ class Aim:
 
     @classmethod
     def none(cls, going: Going) -> Aim:
-        """To go on as they go."""
+        """To go on as they go; who hardly moves, to stand: a stander's sway is no wish to creep."""
         pace, nowhere = going.velocity.norm(dim=1), torch.full_like(going.velocity, torch.nan)
-        nobody = torch.full((len(pace),), -1)
+        pace, nobody = torch.where(pace < STANDING, 0.0, pace), torch.full((len(pace),), -1)
         return cls(pace, going.bearing(), nowhere, nobody, torch.zeros_like(pace))
 
     def __getitem__(self, rows: Tensor) -> Aim:
@@ -85,16 +86,19 @@ class Aim:
         """Speed, way and, of those on a path, bend (batch,); else NaN."""
         to = self.target.numpy() - going.place[:, :2]
         far, speed, way = np.hypot(*to.T), self.speed.numpy(), self.direction.numpy()
-        near = np.where(far < THERE, 0.0, np.maximum(BRAKE * far, 2 * STILL))
+        near = np.where(far < THERE, 0.0, np.maximum(BRAKE * far, STEPS))
         aimed = np.isfinite(far)
         speed = np.where(aimed, np.minimum(speed, near), speed)
         way = np.where(aimed & (far > THERE), np.arctan2(*to.T), way)
         bend = np.full_like(way, np.nan)
         if self.curves is not None and (self.which >= 0).any():
             led = self.which >= 0
-            which, arcs = self.which.clamp(min=0), self.arcs + ahead * self.speed
+            # as far on as they went since: at the speed that is asked, who stands short of an end
+            # would be there within each window, and be told to stand
+            which = self.which.clamp(min=0)
+            arcs = self.arcs + torch.from_numpy(ahead * going.pace)
             left = (self.lengths[which] - arcs).numpy()
-            slow = np.where(left < THERE, 0.0, np.maximum(BRAKE * left, 2 * STILL))
+            slow = np.where(left < THERE, 0.0, np.maximum(BRAKE * left, STEPS))
             led = led.numpy()
             speed = np.where(led, np.minimum(speed, slow), speed)
             look = torch.from_numpy((LOOK * speed).clip(min=LEAST_LOOK))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -12,7 +13,9 @@ from ..encodings import JointAngles
 from ..feet.lock_stream import LockStream
 from ..metrics import broken
 from ..models import Refiner
+from ..models.refiner_step import MOST
 from ..motion import Motion
+from .live_points import rotations_of
 
 
 class Behind:
@@ -49,7 +52,8 @@ class Behind:
         encoding = self.encoding
         frames = frames if self.refiner is None else self._refined(frames)
         rows = torch.cat([self.before[:, None], frames], 1)
-        roots, rotations = encoding.rotations(rows, self.place.to(rows))
+        with np.errstate(all="ignore"):  # as torch: who leaves all bounds is told by the numbers
+            roots, rotations = rotations_of(encoding, rows, self.place)
         contacts = self._contacts(frames)
         made = [
             Motion(encoding.skeleton, root[1:], turns[1:], encoding.fps, contacts=down)
@@ -66,8 +70,8 @@ class Behind:
 
     def _refined(self, frames: Tensor) -> Tensor:
         found = []
-        for frame in frames.split(1, 1):  # one at a time is its fastest
-            refined, self.state = self.refiner.refine(frame, self.state)
+        for some in frames.split(MOST, 1):  # more at a time go another, slower way
+            refined, self.state = self.refiner.refine(some, self.state)
             found.append(refined)
         features = torch.cat(found, 1)
         return broken.within(self.encoding, features) if self.known else features

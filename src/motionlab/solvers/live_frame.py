@@ -132,8 +132,12 @@ class Gliding:
         if self.model.starts is None:
             return
         for row in (self.frames >= GLIDES * going.fps).nonzero()[:, 0].tolist():
-            start = pick_start(self.model, None, float(going.velocity[row].norm()))
+            start = self.start_for(row, going)
             after.state.hidden[row] = self.model.starts.hidden[start]
             after.state.cell[row] = self.model.starts.cell[start]
             self.frames[row] = 0
             self.reminded[row] += 1
+
+    def start_for(self, row: int, going: Going) -> int:
+        """Which of the model's starts a character is reminded of: the one nearest to his pace."""
+        return pick_start(self.model, None, float(going.velocity[row].norm()))

@@ -1,6 +1,6 @@
-"""Where the feet of futures are, in numpy, as `models.refiner_step` has its hands and toes.
+"""Where the feet of futures are, and how a window's bodies stand, in numpy, as `models.refiner_step` has it.
 
-The same as `JointAngles.positions`. Of sixteen futures it is little to calculate in a hundred pieces.
+The same as `JointAngles.positions` and `rotations`. It is little to calculate in a hundred pieces.
 """
 
 from __future__ import annotations
@@ -60,6 +60,48 @@ class FeetPoints:
         world = x * cosine + z * sine + x_at, y + rows[3], z * cosine - x * sine + z_at
         points[:, :, self.feet] = np.stack(world, -1).swapaxes(0, 1).reshape(batch, frames, -1, 3)
         return torch.from_numpy(points)
+
+
+def led(steps: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """x and z (...) of what is to the left and ahead (..., 2) of who faces that way."""
+    sine, cosine = np.sin(yaw), np.cos(yaw)
+    left, ahead = steps[..., 0], steps[..., 1]
+    return left * cosine + ahead * sine, ahead * cosine - left * sine
+
+
+def way_of(rows: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Roots (batch, frames, 3) and yaw (batch, frames) of rows (batch, frames, dim), raw units, the first of
+    which stands at a place (batch, 3); both float64."""
+    yaw = np.concatenate([place[:, 2:], rows[:, 1:, 2]], 1).cumsum(1)
+    root = np.zeros((*rows.shape[:2], 3))
+    root[:, 0, 0], root[:, 0, 2] = place[:, 0], place[:, 1]
+    root[:, 1:, 0], root[:, 1:, 2] = led(rows[:, 1:, :2], yaw[:, :-1])
+    root = root.cumsum(1)
+    root[..., 1] = rows[..., 3]
+    return root, yaw
+
+
+def rotations_of(encoding: JointAngles, features: Tensor, place: Tensor) -> tuple[Tensor, Tensor]:
+    """Root positions (batch, frames, 3) and local rotations (batch, frames, joints, 3, 3), float32.
+
+    features : (batch, frames, dim), raw units; place : (batch, 3), where the first frames stand.
+    """
+    if encoding.rotation != "vector" or features.dtype != torch.float32:
+        return encoding.rotations(features, place.to(features))
+    batch, frames, _ = features.shape
+    root, yaw = way_of(features.numpy().astype(float), place.numpy())
+    rows = features.numpy().reshape(batch * frames, -1).T
+    pose = rows[encoding.slices["pose"]]
+    vectors = np.concatenate([rows[[4, 4, 5]], pose]).reshape(-1, 3, batch * frames)
+    mean = encoding.mean_pose.float().numpy(force=True).copy()
+    mean[0] = np.eye(3)
+    turns = np.ascontiguousarray(turns_of(vectors, mean).transpose(3, 0, 1, 2))
+    sine, cosine, none = np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)
+    faces = [cosine, none, sine, none, none + 1, none, -sine, none, cosine]
+    faces = np.stack(faces, -1).reshape(-1, 3, 3).astype(np.float32)
+    turns[:, 0] = faces @ turns[:, 0]
+    turns = turns.reshape(batch, frames, *turns.shape[1:])
+    return torch.from_numpy(root.astype(np.float32)), torch.from_numpy(turns)
 
 
 @lru_cache(maxsize=8)

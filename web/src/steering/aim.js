@@ -10,7 +10,8 @@ const STARTS = 0.5; // m/s; who is slower, and more than SHARP off, turns before
 const WALKS = 0.9; // m/s; who is slower goes, to a part, where he faces
 export const STILL = 0.15; // m/s; who is asked for less is asked to stand
 const [ON_THE_SPOT, NEAR] = [0.5, 0.35]; // radians off beyond which, and on to which, who stands turns
-const [BRAKE, THERE] = [1, 0.25]; // 1/s, speed a metre before an end; m from it, where one stands
+const [BRAKE, THERE] = [1, 0.15]; // 1/s, speed a metre before an end; m from it, where one stands
+const STEPS = 0.4; // m/s that are asked for at least until there: a slower stride stops halfway
 const BEHIND = 2.6; // radians off, beyond which left and right are as good: the side that is begun stays
 const [LOOK, LEAST_LOOK] = [0.6, 0.5]; // seconds ahead, and metres at least, that are aimed at on a path
 
@@ -29,9 +30,9 @@ export class Aim {
     Object.assign(this, { speed, direction, path, arc });
   }
 
-  /** Nobody has asked for anything: he goes on as he goes. */
+  /** Nobody has asked for anything: he goes on as he goes; who hardly moves, stands: a stander's sway is no wish to creep. */
   static none(going) {
-    return new Aim(going.pace, going.bearing);
+    return new Aim(going.pace < STANDING ? 0 : going.pace, going.bearing);
   }
 
   copy() {
@@ -62,9 +63,9 @@ export class Aim {
   way(going, ahead) {
     const { path, speed } = this;
     if (!path) return { speed, way: this.direction, bend: null };
-    const arc = this.arc + ahead * speed;
+    const arc = this.arc + ahead * going.pace; // as far on as he went since: else who stands short of the end is told to stand
     const left = path.length - arc;
-    const near = left < THERE ? 0 : Math.max(BRAKE * left, 2 * STILL);
+    const near = left < THERE ? 0 : Math.max(BRAKE * left, STEPS);
     const slowed = Math.min(speed, near);
     const there = path.at(arc + Math.max(LOOK * slowed, LEAST_LOOK));
     const to = [there[0] - going.place.x, there[1] - going.place.z];
