@@ -13,11 +13,10 @@ from ..encodings import JointAngles
 from ..errors import SolverError
 from ..models import LstmGmm
 from ..motion import Motion
-from .denoise_seen import NEIGHBOURS, NoiseLevels
+from .denoise_seen import FEWEST, NoiseLevels
 from .denoise_windows import Settings
 from .window import METHODS
 
-FEWEST = NEIGHBOURS + 1  # frames; fewer do not tell noise from motion
 FARTHEST = (
     5.0  # m that a root may be from where it stands at rest, up or down: no one climbs farther
 )
@@ -51,6 +50,11 @@ def check_settings(how: Settings) -> None:
         raise SolverError(
             f"{how.steps} steps, {how.rounds} rounds, batches of {how.batch}, a memory of {how.memory} "
             "frames: each must be 1 or more."
+        )
+    if not (0 <= how.slow < math.inf and 0 < how.spread < math.inf):
+        raise SolverError(
+            f"slow is {how.slow} m/s and spread {how.spread} frames; both are numbers from 0 on, spread "
+            "above it."
         )
     if not all(0 <= weight < math.inf for weight in (how.prior, how.contact)):
         raise SolverError(
