@@ -18,8 +18,8 @@ from motionlab.solvers.denoise_seen import (
     levels_of,
     look,
     motion_of,
-    rows_of,
     outliers_of,
+    rows_of,
     smooth,
 )
 from motionlab.solvers.denoise_windows import Settings, _share, _windows

@@ -11,6 +11,7 @@ the line through all of them is what is corrected, at those frames that it knows
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
@@ -20,7 +21,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 from torch import Tensor, nn
 
-from ..errors import SolverError
+from ..errors import SkeletonError, SolverError
 from ..feet.contacts import label
 from ..filters import channel_mask, channels_of, joined
 from ..ik.turns import shortest_turn
@@ -145,9 +146,10 @@ def _brought_over(
     """
     if known.skeleton.matches(body):
         return line, known
-    # feet stand flat on the floor there, or the network would not know it for a walk
-    down = label(line, "speed-height", speed=slow)
-    over = replace(retarget(replace(line, contacts=down), body, reference=reference), contacts=None)
+    with suppress(SkeletonError):  # a rig that lacks a foot: retarget tells of it
+        # feet stand flat on the floor there, or the network would not know it for a walk
+        line = replace(line, contacts=label(line, "speed-height", speed=slow))
+    over = replace(retarget(line, body, reference=reference), contacts=None)
     off = known.orientations() @ line.orientations().mT
     roles, own = body.roles, known.skeleton.roles
     shared = {joint: own[role] for role, joint in roles.items() if role in own}
