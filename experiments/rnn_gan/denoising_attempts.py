@@ -1,6 +1,6 @@
 """What was tried for the lines of W7 that are missed: a gap of half a second, runs, and feet that slide.
 
-    python -m experiments.rnn_gan.denoising_attempts [--clips 5]
+    python -m experiments.rnn_gan.denoising_attempts [--clips 3]
 
 Validation clips that walk and run, each noise as in `denoising`, and what the network always says there,
 without a step back, so that the attempts alone are compared.
@@ -65,7 +65,7 @@ ATTEMPTS = {
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", default="everything")
-    parser.add_argument("--clips", type=int, default=5)
+    parser.add_argument("--clips", type=int, default=3)
     parser.add_argument("--output", default="results/denoising_attempts.json")
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
