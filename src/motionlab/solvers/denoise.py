@@ -195,6 +195,7 @@ def clean_jobs(
         its = cleaned[id(job)]
         toes = resting(encoding, its.rows, how.slow)[:, [1, 3]]
         likelihood, least = judge(model, its.rows, toes, job.noise)
+        least = least if how.least is None else how.least
         known = likelihood >= least
         done.append(
             Done(its.rows, "map", likelihood, least, its)

@@ -56,6 +56,8 @@ def check_settings(how: Settings) -> None:
             f"slow is {how.slow} m/s and spread {how.spread} frames; both are numbers from 0 on, spread "
             "above it."
         )
+    if how.least is not None and not isinstance(how.least, int | float):
+        raise SolverError(f"least is {how.least!r}; it must be a number of nats a frame, or None.")
     if not all(0 <= weight < math.inf for weight in (how.prior, how.contact)):
         raise SolverError(
             f"prior {how.prior} and contact {how.contact} are factors, from 0 on, of two terms."

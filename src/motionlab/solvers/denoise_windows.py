@@ -41,6 +41,8 @@ class Settings:
     slow : m/s below which a toe is taken to rest while noise is still left on it; labels have 0.45.
     spread : frames over which a change spreads to both sides; what is sought is as smooth as the line
         that it is added to, so that little noise can come back with it.
+    least : nats a frame that the likeliest motion must have, or a smooth line comes back; -inf: it never
+        does. None: as `denoise_known` has it.
     disturbed : whether the network's inputs may be disturbed, d of eq. 17.
     first_state : whether the memory before a clip's first frame is found by gradient (eq. 27).
     """
@@ -56,6 +58,7 @@ class Settings:
     contact: float = 1.0
     slow: float = 0.6
     spread: float = 1.5
+    least: float | None = None
     disturbed: bool = False
     first_state: bool = False
 
