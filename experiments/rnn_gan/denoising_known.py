@@ -34,12 +34,13 @@ from motionlab.training import Prepared
 from motionlab.weights import find
 
 from ..common import record
+from ..common.rollouts import spread_evenly
 from .denoising import NAME
 from .noises import HIGH, KINDS, LOW, MID, is_kind, pieces
 
 LEVELS = {"low": LOW, "mid": MID, "high": HIGH}
 ON_RIGS = ("low", "mid")
-SECONDS = 3.0  # of a recording
+PER_RIG, SECONDS = 2, 3.0  # recordings of a kind, and how much of each
 ALWAYS, NEVER = Settings(least=-math.inf), Settings(least=math.inf, rounds=1, steps=1)
 SLOPES = [0.5 * i for i in range(41)]
 HARM = 2.0
@@ -109,7 +110,7 @@ def own_body(model: nn.Module, data: Prepared, count: int) -> Iterator[Case]:
 
 
 def on_rigs(model: nn.Module, seconds: float = SECONDS) -> Iterator[Case]:
-    """The first recording of each kind and source, on its own rig."""
+    """Two recordings of each kind and source, on their own rig."""
     for source, kind, truth in recordings(seconds):
         for noise in ON_RIGS:
             seen = trembling(truth, noise)
@@ -132,8 +133,8 @@ def recordings(seconds: float) -> Iterator[tuple[str, str, Motion]]:
                 for clip in registry.members("everything")
                 if clip.source == source and clip.split == "val" and is_kind(clip, kind)
             ]
-            if clips:
-                (motion,) = datasets.load(source, clips=[clips[0].name], download=False)
+            some = [clips[i].name for i in spread_evenly(len(clips), PER_RIG)]
+            for motion in datasets.load(source, clips=some, download=False) if some else ():
                 frames = min(len(motion), round(seconds * motion.fps))
                 first = (len(motion) - frames) // 2
                 yield source, kind, motion[first : first + frames]
