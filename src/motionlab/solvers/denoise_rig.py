@@ -45,7 +45,15 @@ from .denoise import (
     needs_nothing,
     record_of,
 )
-from .denoise_checks import FEWEST, check_clip, check_levels, check_model, check_settings, mask_of
+from .denoise_checks import (
+    called,
+    check_clip,
+    check_length,
+    check_levels,
+    check_model,
+    check_settings,
+    mask_of,
+)
 from .denoise_seen import (
     NoiseLevels,
     Seen,
@@ -94,14 +102,13 @@ def clean_recording(
     check_model(model)
     check_settings(how)
     encoding, begin = model.encoding, time.process_time()
-    if not isinstance(motion, Motion) or len(motion) < FEWEST:
-        raise SolverError(
-            f"{motion!r} is no motion of {FEWEST} frames or more; fewer do not tell noise from motion."
-        )
+    if not isinstance(motion, Motion):
+        raise SolverError(f"clean_recording takes a Motion, not {type(motion).__name__}.")
+    check_length(motion)
     size = foot_to_head(motion.skeleton)
     if size is not None and not SMALLEST < size < LARGEST:
         raise SolverError(
-            f"{motion!r} is of a body of {size:.3g} m from foot to head. Are lengths in metres? "
+            f"{called(motion)} is of a body of {size:.3g} m from foot to head. Are lengths in metres? "
             "read_bvh(path, units='mm') reads millimetres."
         )
     there = mask_of(motion, missing)
