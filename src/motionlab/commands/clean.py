@@ -51,20 +51,21 @@ class Clean(Written):
         super().run()
 
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
-        before, said = motion, []
+        before, said, wild = motion, [], []
         if self.denoise is not None:
-            motion, said = self._denoised(motion)
+            motion, said, wild = self._denoised(motion)
         if self.feet or self.denoise is None:
             motion, more = _held(motion, math.inf if self.denoise is None else DEEPEST)
             said += more
         if self.report is not None:
             from .clean_report import write_report
 
-            write_report(before, motion, said, self.report)
+            write_report(before, motion, said, self.report, wild)
             said.append(f"before and after in {self.report}")
         return motion, said
 
-    def _denoised(self, motion: Motion) -> tuple[Motion, list[str]]:
+    def _denoised(self, motion: Motion) -> tuple[Motion, list[str], list[int]]:
+        """The clean motion, what is said of it, and frames that were not believed."""
         from ..solvers import clean_recording
 
         found, record = clean_recording(motion, noise=self._levels, progress=True)
@@ -75,16 +76,17 @@ class Clean(Written):
             f"{math.degrees(noise['angle_rad']):.1f}° of angles ({told})"
         ]
         if record["way"] == "unchanged":
-            return motion, [*said, "so little that nothing was changed"]
-        if record["outliers"]:
-            frames = record["outliers"]
+            return motion, [*said, "so little that nothing was changed"], []
+        frames = record["outliers"]
+        if frames:
             some = ", ".join(map(str, frames[:5])) + (", ..." if len(frames) > 5 else "")
             said.append(f"{len(frames)} frames not believed ({some})")
         if record["way"] == "filter":
             said.append("the network does not know such motion, so it was only smoothed")
         if record["elsewhere as it was"]:
             said.append("the rest is calm: only these frames were changed")
-        return found, [*said, f"joints moved by up to {record['changed (cm)']:.1f} cm"]
+        said.append(f"joints moved by up to {record['changed (cm)']:.1f} cm")
+        return found, said, frames
 
 
 def _levels(text: str) -> tuple[float, float]:
