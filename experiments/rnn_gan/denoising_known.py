@@ -17,6 +17,7 @@ import math
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import torch
@@ -28,6 +29,7 @@ from motionlab.datasets import registry
 from motionlab.datasets.loader import stance
 from motionlab.solvers import clean_recording
 from motionlab.solvers.denoise import clean_jobs, job_of, see
+from motionlab.solvers.denoise_rig import noise_left
 from motionlab.solvers.denoise_seen import LEAST_ANGLE, motion_of
 from motionlab.solvers.denoise_windows import Settings
 from motionlab.training import Prepared
@@ -50,7 +52,7 @@ BY_HAND = (61.2, 7.2)  # the line that was drawn by hand before
 class Case(NamedTuple):
     """One clip with noise: what the network always says, and what a smooth line, cm from the truth.
 
-    where : "own body", or whose rig it is. angle : radians of noise, as the clip told it.
+    where : "own body", or whose rig it is. angle : radians of noise at the network's rate, as the clip told it.
     """
 
     where: str
@@ -76,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     model = motionlab.load(NAME).requires_grad_(False)
     data = Prepared.find(chosen.data).matching(model.encoding)
     found = []
-    for case in (*own_body(model, data, chosen.clips), *on_rigs(model)):
+    for case in chain(own_body(model, data, chosen.clips), on_rigs(model)):
         found.append(case)
         print(*(f"{x:.3g}" if isinstance(x, float) else x for x in case), flush=True)
     line = fitted(found)
@@ -118,8 +120,9 @@ def on_rigs(model: nn.Module, seconds: float = SECONDS) -> Iterator[Case]:
                 seen, model, reference=stance(source), settings=how
             )
             network, line = way(ALWAYS), way(NEVER)
+            left = noise_left(truth.fps / model.encoding.fps)
             yield Case(
-                source, kind, noise, network.record["noise"]["angle_rad"],
+                source, kind, noise, left * network.record["noise"]["angle_rad"],
                 network.record["likelihood"], off(network.motion, truth), off(line.motion, truth),
             )  # fmt: skip
 

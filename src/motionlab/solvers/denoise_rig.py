@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 import torch
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import correlate1d
 from torch import Tensor, nn
 
 from ..errors import SkeletonError, SolverError
@@ -207,21 +207,36 @@ def _cleaned(
 def _at(
     own: Tensor, known: Tensor, seen: Seen, levels: NoiseLevels, times: float
 ) -> tuple[Seen, NoiseLevels]:
-    """What was seen at the network's moments, each the mean of `times` frames around it, if so many are."""
-    width = max(1, round(times))
+    """What was seen at the network's moments, each the mean of the frames about it that belong to it."""
+    shares = _shares(times)
+    mean = lambda x: correlate1d(x, shares, axis=0, mode="nearest")
     believed = seen.believed.double().numpy()
-    mean = lambda x: uniform_filter1d(x, width, axis=0, mode="nearest")
     weight = mean(believed)
     rows = mean(believed * seen.rows.numpy()) / np.maximum(weight, 1e-9)
     rows = np.where(weight > 1e-6, rows, seen.rows.numpy())
     nearest = (known * (1 / (own[1] - own[0]))).round().long().clamp(max=len(own) - 1)
-    mask = torch.from_numpy(weight > 0.5 / width)[nearest]
+    mask = torch.from_numpy(weight > shares.min() / 2)[nearest]
     found = Seen(
         _between(own, torch.from_numpy(rows), known),
         mask,
         torch.zeros(len(known), dtype=torch.bool),
     )
-    return found, NoiseLevels(*(level / width**0.5 for level in levels))
+    left = noise_left(times)
+    return found, NoiseLevels(*(level * left for level in levels))
+
+
+def _shares(times: float) -> np.ndarray:
+    """Of frames about one, for so many of them to each of the network's; as many before it as after."""
+    half = max(times, 1.0) / 2
+    reach = np.arange(-round(half), round(half) + 1)
+    inside = np.minimum(reach + 0.5, half) - np.maximum(reach - 0.5, -half)
+    shares = inside.clip(0)
+    return shares / shares.sum()
+
+
+def noise_left(times: float) -> float:
+    """What is left of the deviation of white noise in means of so many frames."""
+    return float(np.square(_shares(times)).sum() ** 0.5)
 
 
 def _between(own: Tensor, rows: Tensor, known: Tensor) -> Tensor:
