@@ -12,6 +12,7 @@ from motionlab.errors import MotionError, RetargetError, SolverError
 from motionlab.motion import Motion
 from motionlab.skeleton import Skeleton
 from motionlab.solvers import NoiseLevels, clean_recording, denoise
+from motionlab.solvers.denoise_rig import _at
 from motionlab.solvers.denoise_seen import (
     Seen,
     cross_validated,
@@ -304,3 +305,20 @@ def test_motion_that_the_network_does_not_know_is_only_smoothed(clips, model):
         assert error(found.motion, line) < 0.01
     known = denoise(noisy(clips[0], LEVELS), model)
     assert known.record["way"] == "map"
+
+
+@pytest.mark.parametrize("times", [1, 2, 3, 4])
+def test_means_of_frames_lag_nowhere_and_their_noise_is_told(times):
+    """Who walks on straight is where he was, at every rate; white noise is left as is said."""
+    frames = 4000
+    own = torch.arange(frames).double() / (30 * times)
+    known = torch.arange(int(own[-1] * 30 + 1e-6) + 1).double() / 30
+    rows = own[:, None] * torch.ones(9).double()
+    mask = torch.ones(frames, 9, dtype=torch.bool)
+    seen = Seen(rows, mask, torch.zeros(frames, dtype=torch.bool))
+    few, levels = _at(own, known, seen, NoiseLevels(1.0, 1.0), times)
+    assert torch.allclose(few.rows[2:-2], known[2:-2, None].expand(-1, 9), atol=1e-9)
+    chance = torch.Generator().manual_seed(0)
+    noise = torch.randn(frames, 9, generator=chance).double()
+    few, _ = _at(own, known, replace(seen, rows=noise), NoiseLevels(1.0, 1.0), times)
+    assert float(few.rows.std()) == pytest.approx(levels.root_m, rel=0.05)
