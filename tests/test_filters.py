@@ -93,6 +93,23 @@ def test_kalman_is_the_smoother_written_out(noise, lost):
         assert np.abs(found[:, axis].numpy() - wanted).max() < 2e-3
 
 
+def test_a_smooth_line_goes_straight_on_where_nothing_is_seen():
+    """Through points of a straight line it is that line, in gaps and beyond the ends; elsewhere, too."""
+    line = torch.arange(40.0)[:, None].double() * torch.tensor([0.1, -3.0, 1.0, 1.0])
+    seen = torch.ones(40, 4, dtype=torch.bool)
+    seen[[0, 1, 2, *range(15, 20), 38, 39]] = False
+    seen[:, 2], seen[4:, 3] = False, False
+    hidden = torch.where(seen, line, 99.0)
+    found = filters.smooth_lines(hidden, seen, torch.tensor([5.0, 80.0, 5.0, 5.0]))
+    torch.testing.assert_close(found[:, :2], line[:, :2], rtol=0, atol=1e-6)
+    assert not found[:, 2].any()  # never seen
+    assert (found[:, 3] == 3).all()  # too few for a spline: their mean
+    bent = hidden.clone()
+    bent[:, 0] += (torch.arange(40) / 5).sin()
+    its = filters.smooth_lines(bent, seen, 30.0)[:, 0]
+    torch.testing.assert_close(its[-3:].diff(n=2), torch.zeros(1).double(), rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["butterworth", "kalman"])
 def test_a_cut_off_halves_what_it_should(name):
     """Half of the size for the smoother, half of the power for Butterworth, at any frame rate."""

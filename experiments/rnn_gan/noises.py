@@ -92,7 +92,7 @@ def pieces(data: Prepared, kind: str, split: str, count: int) -> list[Motion]:
     clips = zip(data.names, data.splits, data.features.split(data.lengths.tolist()), strict=True)
     found = [
         (name, rows) for name, its, rows in clips
-        if its == split and name in table and len(rows) >= FRAMES and _is(table[name], kind)
+        if its == split and name in table and len(rows) >= FRAMES and is_kind(table[name], kind)
     ]  # fmt: skip
     cut = []
     for index in spread_evenly(len(found), count):
@@ -102,7 +102,7 @@ def pieces(data: Prepared, kind: str, split: str, count: int) -> list[Motion]:
     return cut
 
 
-def _is(clip: registry.Clip, kind: str) -> bool:
+def is_kind(clip: registry.Clip, kind: str) -> bool:
     if kind == "unseen":
         return kind_of(clip) in UNSEEN
     return clip.action == {"walking": "walk", "running": "run"}[kind]

@@ -155,26 +155,26 @@ def _neighbours(seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 # -- channels -------------------------------------------------------------------------------------
 
 
-class _Channels(NamedTuple):
+class Channels(NamedTuple):
     """A motion as numbers over time, (frames, 6 + 3 (joints - 1)), and about which mean pose."""
 
     numbers: np.ndarray
     mean: Tensor
 
 
-def _split(motion: Motion) -> _Channels:
+def channels_of(motion: Motion) -> Channels:
     """Place, heading and tilt of the root, then rotation vectors about the mean pose, float64."""
     rotations = motion.rotations.double()
     yaw = heading(rotations[:, 0])
     tilt = roma.rotmat_to_rotvec(yaw_matrix(yaw).mT @ rotations[:, 0])[:, [0, 2]]
     mean = roma.special_procrustes(rotations[:, 1:].mean(0))
-    turns = _unwrapped(roma.rotmat_to_rotvec(mean.mT @ rotations[:, 1:]))
+    turns = unwrapped(roma.rotmat_to_rotvec(mean.mT @ rotations[:, 1:]))
     yaw = torch.from_numpy(np.unwrap(yaw.numpy()))
     parts = [motion.root_positions.double(), yaw[:, None], tilt, turns.flatten(1)]
-    return _Channels(torch.cat(parts, 1).numpy(), mean)
+    return Channels(torch.cat(parts, 1).numpy(), mean)
 
 
-def _joined(motion: Motion, numbers: np.ndarray, mean: Tensor) -> Motion:
+def joined(motion: Motion, numbers: np.ndarray, mean: Tensor) -> Motion:
     """A motion with other numbers."""
     numbers = torch.from_numpy(np.ascontiguousarray(numbers))
     zero = torch.zeros_like(numbers[:, 4])
@@ -185,7 +185,7 @@ def _joined(motion: Motion, numbers: np.ndarray, mean: Tensor) -> Motion:
     return replace(motion, root_positions=numbers[:, :3].float(), rotations=rotations.float())
 
 
-def _unwrapped(turns: Tensor) -> Tensor:
+def unwrapped(turns: Tensor) -> Tensor:
     """Rotation vectors (frames, joints, 3), each of the whole turns that is nearest to the one before."""
     found = turns.clone()
     jumps = (turns.diff(dim=0).norm(dim=-1) > torch.pi).any(0)  # others are near all the time
@@ -201,27 +201,56 @@ def _unwrapped(turns: Tensor) -> Tensor:
 
 def _over(motion: Motion, missing: Tensor | None, run) -> Motion:
     """A filter of arrays (frames, channels) run over the channels of what was filled."""
-    numbers, mean = _split(filled(motion, missing))
-    return _joined(motion, run(numbers), mean)
+    numbers, mean = channels_of(filled(motion, missing))
+    return joined(motion, run(numbers), mean)
 
 
 def _splines(motion: Motion, missing: Tensor | None, strength: float) -> Motion:
     """Cubic smoothing splines through the frames in which a channel was seen."""
-    seen = seen_mask(motion, missing)
-    numbers, mean = _split(filled(motion, missing))
-    channels = torch.cat([seen[:, :1].expand(-1, 6), seen[:, 1:].repeat_interleave(3, 1)], 1)
-    time = np.arange(len(motion)) / motion.fps
-    patterns, which = channels.unique(dim=1, return_inverse=True)
-    found = np.empty_like(numbers)
-    for number, rows in enumerate(patterns.T.numpy()):
-        if rows.sum() < _FEWEST:
-            raise MotionError(
-                f"kalman: {int(rows.sum())} of {len(motion)} frames are seen; it needs {_FEWEST}."
-            )
-        its = (which == number).numpy()
-        spline = make_smoothing_spline(time[rows], numbers[rows][:, its], lam=strength)
-        found[:, its] = spline(time)
-    return _joined(motion, found, mean)
+    seen = channel_mask(seen_mask(motion, missing))
+    if (fewest := int(seen.sum(0).min())) < _FEWEST:
+        raise MotionError(f"kalman: {fewest} of {len(motion)} frames are seen; it needs {_FEWEST}.")
+    numbers, mean = channels_of(filled(motion, missing))
+    lines = smooth_lines(torch.from_numpy(numbers), seen, strength * motion.fps**3)
+    return joined(motion, lines.numpy(), mean)
+
+
+def channel_mask(joints: Tensor) -> Tensor:
+    """A mask (frames, joints) for channels (frames, channels): the root's six, three of each other."""
+    root, others = joints[:, :1].expand(-1, 6), joints[:, 1:].repeat_interleave(3, dim=1)
+    return torch.cat([root, others], dim=1)
+
+
+def smooth_lines(numbers: Tensor, seen: Tensor, stiffness: Tensor | float) -> Tensor:
+    """The smooth line through each channel: ``min Σ (numbers - x)² + stiffness ∫ x''²``, time in frames.
+
+    Parameters
+    ----------
+    numbers : (frames, channels) float64; seen : bool like them, what counts.
+    stiffness : of all, or (channels,).
+
+    Returns
+    -------
+    (frames, channels), straight on before the first and after the last frame that was seen; the mean
+    of what was seen of a channel in fewer frames than a spline needs, 0 if that is none.
+    """
+    each = torch.as_tensor(stiffness).double().expand(numbers.shape[1])
+    found = np.zeros(numbers.shape)
+    time, values = np.arange(len(numbers), dtype=float), numbers.double().numpy()
+    groups: dict[tuple[bytes, float], list[int]] = {}
+    for channel, its in enumerate(each.tolist()):
+        groups.setdefault((seen[:, channel].numpy().tobytes(), its), []).append(channel)
+    for (_, its), channels in groups.items():
+        there = seen[:, channels[0]].numpy()
+        if there.sum() < _FEWEST:
+            some = values[there][:, channels]
+            found[:, channels] = some.mean(0) if len(some) else 0.0
+            continue
+        spline = make_smoothing_spline(time[there], values[there][:, channels], lam=its)
+        inner = time.clip(*time[there][[0, -1]])
+        beyond = (time - inner)[:, None] * spline(inner, 1)
+        found[:, channels] = spline(inner) + beyond
+    return torch.from_numpy(found)
 
 
 def _positive(motion: Motion, name: str, **settings: float) -> None:

@@ -21,6 +21,7 @@ _STYLE = """<style>
 .curve line { stroke: currentColor; opacity: 0.35; }
 .curve text { fill: currentColor; font: 11px system-ui, sans-serif; }
 .curve polyline { fill: none; stroke-width: 1.5; }
+.curve .wild { fill: #c00000; }
 .before { stroke: #c26a00; } .after { stroke: #1f77d0; }
 .key { display: inline-block; width: 1.2em; border-top: 3px solid; vertical-align: middle; }
 table { border-collapse: collapse; margin: 0.5rem 0; }
@@ -30,8 +31,17 @@ td, th { padding: 0.1rem 0.8rem 0.1rem 0; text-align: right; } th:first-child, t
 """
 
 
-def write_report(before: Motion, after: Motion, said: Sequence[str], path: Path) -> None:
-    """Write the page. before, after : of the same rig and rate; said : in words, what was done."""
+def write_report(
+    before: Motion, after: Motion, said: Sequence[str], path: Path, wild: Sequence[int] = ()
+) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    before, after : of the same rig and rate.
+    said : in words, what was done.
+    wild : frames that were not believed. Curves are scaled by all others, and mark these.
+    """
     from ..training.checkpoints import write_whole
     from ..viewer import show
     from ..viewer.live.whole_page import whole_page
@@ -41,20 +51,23 @@ def write_report(before: Motion, after: Motion, said: Sequence[str], path: Path)
         colors=["#c26a00", "#1f77d0"],
     )  # fmt: skip
     title = f"{before.name or 'A recording'}, cleaned"
-    page = whole_page(figure, title, "; ".join(said), below=_below(before, after))
+    page = whole_page(figure, title, "; ".join(said), below=_below(before, after, list(wild)))
     write_whole(path, lambda stream: stream.write(page.encode()))
 
 
-def _below(before: Motion, after: Motion) -> str:
+def _below(before: Motion, after: Motion, wild: list[int]) -> str:
     """What stands below the player, as HTML."""
-    joints = before.skeleton.joints
+    joints, fps = before.skeleton.joints, before.fps
     far = 100 * (after.positions() - before.positions()).norm(dim=-1)[:, :joints]
     turned = _angles(before, after)
-    worst = turned.square().mean(0).sqrt().argsort(descending=True)[:WORST].tolist()
+    others = torch.ones(len(before), dtype=torch.bool)
+    others[wild] = False
+    others |= ~others.any()
+    worst = turned[others].square().mean(0).sqrt().argsort(descending=True)[:WORST].tolist()
     names = before.skeleton.names
     parts = [_STYLE, "<h2>How far joints were moved, frame by frame</h2>",
-             "<p>The mean over joints, in centimetres, over seconds.</p>",
-             _picture([("after", far.mean(1))], before.fps, "cm")]  # fmt: skip
+             f"<p>The mean over joints, in centimetres, over seconds.{_of_marks(wild)}</p>",
+             _picture([("after", far.mean(1))], fps, "cm", others)]  # fmt: skip
     parts.append(
         '<h2>The joints that were turned most</h2><p><span class="key before"'
         ' style="border-color:#c26a00"></span> before, <span class="key after"'
@@ -62,20 +75,33 @@ def _below(before: Motion, after: Motion) -> str:
         "changed most, in degrees, over seconds.</p>"
     )
     for joint in worst:
-        lines = _most_changed(before.rotations[:, joint], after.rotations[:, joint])
+        turns = before.rotations[:, joint], after.rotations[:, joint]
+        lines = list(zip(("before", "after"), _most_changed(*turns, others), strict=True))
         parts.append(f"<p>{html.escape(names[joint])}</p>")
-        parts.append(_picture(list(zip(("before", "after"), lines, strict=True)), before.fps, "°"))
+        parts.append(_picture(lines, fps, "°", others))
+    at = others.nonzero()[:, 0]
+    its, turned = far[others], turned[others]
     rows = "".join(
-        f"<tr><td>{html.escape(names[j])}</td><td>{far[:, j].mean():.1f}</td>"
-        f"<td>{far[:, j].max():.1f}</td><td>{float(far[:, j].argmax()) / before.fps:.2f}</td>"
+        f"<tr><td>{html.escape(names[j])}</td><td>{its[:, j].mean():.1f}</td>"
+        f"<td>{its[:, j].max():.1f}</td><td>{float(at[its[:, j].argmax()]) / fps:.2f}</td>"
         f"<td>{turned[:, j].mean():.1f}</td></tr>"
-        for j in far.mean(0).argsort(descending=True).tolist()
+        for j in its.mean(0).argsort(descending=True).tolist()
     )
+    without = " Frames that were not believed are left out.</p>" if wild else "</p>"
     parts.append(
-        '<h2>Joint by joint</h2><div class="wide"><table><tr><th>joint</th><th>moved, mean (cm)</th>'
+        f"<h2>Joint by joint</h2><p>How far each was moved and turned.{without}"
+        '<div class="wide"><table><tr><th>joint</th><th>moved, mean (cm)</th>'
         "<th>most (cm)</th><th>at (s)</th><th>turned, mean (°)</th></tr>" + rows + "</table></div>"
     )
     return "\n".join(parts)
+
+
+def _of_marks(wild: list[int]) -> str:
+    """In words, what the marks of curves are."""
+    if not wild:
+        return ""
+    frames = "a frame that was" if len(wild) == 1 else f"{len(wild)} frames that were"
+    return f" ▾ marks {frames} not believed, where a curve may leave the picture."
 
 
 def _angles(before: Motion, after: Motion) -> Tensor:
@@ -84,28 +110,37 @@ def _angles(before: Motion, after: Motion) -> Tensor:
     return turns.norm(dim=-1).rad2deg()
 
 
-def _most_changed(before: Tensor, after: Tensor) -> tuple[Tensor, Tensor]:
-    """One part (frames,) of both rotation vectors about the mean after, in degrees."""
+def _most_changed(before: Tensor, after: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+    """One part (frames,) of both rotation vectors about the mean after, in degrees.
+
+    That which was changed most in `others`, bool (frames,).
+    """
     mean = roma.special_procrustes(after.mean(0))
     vectors = [roma.rotmat_to_rotvec(mean.mT @ turns).rad2deg() for turns in (before, after)]
-    part = int((vectors[0] - vectors[1]).square().mean(0).argmax())
+    part = int((vectors[0] - vectors[1])[others].square().mean(0).argmax())
     return vectors[0][:, part], vectors[1][:, part]
 
 
-def _picture(lines: list[tuple[str, Tensor]], fps: float, unit: str) -> str:
-    """Lines (frames,) by their classes over time, as SVG."""
-    values = torch.cat([line for _, line in lines])
+def _picture(lines: list[tuple[str, Tensor]], fps: float, unit: str, others: Tensor) -> str:
+    """Lines (frames,) by their classes over time, as SVG, scaled by `others`, bool (frames,), and the
+    rest marked."""
+    values = torch.cat([line[others] for _, line in lines])
     low, high = float(values.min()), float(values.max())
     low, high = (low, high) if high - low > 1e-3 else (low - 1, high + 1)
     frames = len(lines[0][1])
     across = lambda t: 40 + (WIDE - 50) * t / max(1, frames - 1)
-    up = lambda value: 8 + (HIGH - 30) * (high - value) / (high - low)
+    up = lambda value: 8 + (HIGH - 30) * (high - min(max(value, low), high)) / (high - low)
     step = max(1, math.ceil(frames / MOST))
     drawn = "".join(
         f'<polyline class="{name}" points="'
         + " ".join(f"{across(t):.1f},{up(float(line[t])):.1f}" for t in range(0, frames, step))
         + '"/>'
         for name, line in lines
+    )
+    drawn += "".join(
+        f'<text class="wild" x="{across(t):.1f}" y="9" text-anchor="middle">▾'
+        f"<title>frame {t}, not believed</title></text>"
+        for t in (~others).nonzero()[:, 0].tolist()
     )
     floor = HIGH - 22
     return (

@@ -28,7 +28,7 @@ from .bvh_like import Header
 from .bvh_reading import Doubts, Reading, parse, read
 from .bvh_units import in_metres
 from .bvh_up import check_up, turn_back, turned_back, vertical
-from .euler import to_euler
+from .euler import to_euler, unrolled
 from .free_names import safe_names
 from .root_motion import Parts, check_kind, root_name
 from .root_motion import split as split_root
@@ -198,7 +198,7 @@ def _clip(motion: Motion, scale: float) -> pybvh.Bvh:
     """pybvh's clip; scale : units in a metre."""
     order = _depth_first(motion.skeleton.parents)
     root_positions, rotations = motion.numpy()
-    angles = to_euler(rotations, motion.skeleton.rotation_orders)
+    angles = unrolled(to_euler(rotations, motion.skeleton.rotation_orders))
     return pybvh.Bvh(
         nodes=_nodes(motion.skeleton, order, scale),
         root_pos=root_positions.astype(np.float64) * scale,

@@ -16,7 +16,7 @@ from ..skeleton import Skeleton
 from .bvh_header import Layout, Tree
 from .bvh_reading import Reading, parse
 from .bvh_text import decode, opened, split
-from .euler import to_euler
+from .euler import to_euler, unrolled
 
 _STILL = 1e-4  # degrees; a joint that turns by less about an axis needs no channel for it
 _Channel = tuple[str, int]  # "position" or "rotation", and axis 0 to 2
@@ -55,7 +55,7 @@ class Header:
         """The file with the rows of another motion of `skeleton`, in the file's axes; scale : units in
         a metre."""
         root_positions, rotations = motion.numpy()
-        angles = np.rad2deg(to_euler(rotations, self.skeleton.rotation_orders))
+        angles = np.rad2deg(unrolled(to_euler(rotations, self.skeleton.rotation_orders)))
         channels = self._channels(angles)
         rows = np.empty((len(motion), sum(map(len, channels))))
         each = ((joint, *channel) for joint, listed in enumerate(channels) for channel in listed)

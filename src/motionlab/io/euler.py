@@ -46,6 +46,25 @@ def to_euler(rotations: np.ndarray, orders: Sequence[str]) -> np.ndarray:
     return angles
 
 
+def unrolled(angles: np.ndarray) -> np.ndarray:
+    """The same rotations by angles (frames, joints, 3), radians, that do not jump from frame to frame.
+
+    Of three angles about different axes there is another triple, with half a turn more of the first and
+    the third and the second mirrored, and whole turns on top. Each frame has what is nearest to the one
+    before; the first stays.
+    """
+    if len(angles) < 2:
+        return angles
+    others = angles * [1, -1, 1] + np.pi
+    apart = lambda a, b: np.square((a - b + np.pi) % (2 * np.pi) - np.pi).sum(-1)
+    # another frame before asks for the other triple now, as both are equally far from each other
+    changes = apart(others[1:], angles[:-1]) < apart(angles[1:], angles[:-1])
+    other = np.cumsum(changes, axis=0) % 2 == 1
+    found = angles.copy()
+    found[1:] = np.where(other[..., None], others[1:], angles[1:])
+    return np.unwrap(found, axis=0)
+
+
 def _by_order(orders: Sequence[str]) -> list[tuple[list[int], list[int], float]]:
     """For each rotation order its joints, its three axes, and the sign of its angles: what is
     written out for axes in cyclic order holds for the others with negated angles."""

@@ -18,7 +18,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
-import roma
 import torch
 from torch import Tensor, nn
 from tqdm import tqdm
@@ -44,19 +43,14 @@ from .denoise_seen import (
     NoiseLevels,
     Seen,
     cross_validated,
-    joints_of,
-    levels_of,
+    look,
     motion_of,
-    outliers_of,
     rows_of,
     smooth,
 )
 from .denoise_windows import Cleaned, Job, Settings, clean
 
 MODEL = "lstm-gmm-contacts"
-# m/s below which a toe is taken to rest while noise is still left on it; the labels' own is 0.45
-SLOW = 0.6
-BORDER = 2  # frames over which a calm recording fades into one that was mended
 
 
 class Denoised(NamedTuple):
@@ -117,7 +111,7 @@ def denoise(
     * "likelihood" of the likeliest motion, nats a frame, and "least", below which it is not known;
     * "changed (cm)": farthest that a joint was moved, where it was seen;
     * "elsewhere as it was": whether the clip is calm, so that only frames which were not seen or not
-      believed were changed, and two to both sides of them;
+      believed were changed;
     * "energy": nats a frame of each term, weighed; "evaluations" of it;
     * "seconds": of the processor, the clip's share.
     """
@@ -148,7 +142,9 @@ def denoise(
     for clip, job, its in zip(clips, jobs, done, strict=True):
         motion = clip
         if its.way != "unchanged":
-            motion = mended(clip, motion_of(model.encoding, its.rows, clip), job)
+            motion = motion_of(model.encoding, its.rows, clip)
+            if calm(job.noise):
+                motion = as_seen(clip, motion, believed_joints(job.seen))
             motion = replace(motion, contacts=label(motion))
         seen = job.seen.mask[:, 5::3]  # one channel of each joint
         record = record_of(clip, motion, seen, job, its, noise is None, share * len(clip))
@@ -185,7 +181,7 @@ def clean_jobs(
     with tqdm(total=total, unit="frame", disable=not progress, leave=False) as bar:
         for _ in range(how.rounds if needed else 0):
             for job in needed:
-                job.contacts = resting(encoding, job.rows, SLOW)[:, [1, 3]].double()
+                job.contacts = resting(encoding, job.rows, how.slow)[:, [1, 3]].double()
             with torch.no_grad(), _weights_alone(model):
                 found = clean(model, needed, how, generator, bar.update)
             for job, its in zip(needed, found, strict=True):
@@ -197,8 +193,9 @@ def clean_jobs(
             done.append(Done(job.seen.rows, "unchanged", float("nan"), float("nan"), None))
             continue
         its = cleaned[id(job)]
-        toes = resting(encoding, its.rows, SLOW)[:, [1, 3]]
+        toes = resting(encoding, its.rows, how.slow)[:, [1, 3]]
         likelihood, least = judge(model, its.rows, toes, job.noise)
+        least = least if how.least is None else how.least
         known = likelihood >= least
         done.append(
             Done(its.rows, "map", likelihood, least, its)
@@ -212,11 +209,10 @@ def see(
     encoding: JointAngles, clip: Motion, noise: tuple | None, missing: Tensor | None
 ) -> tuple[Seen, NoiseLevels]:
     """A clip as it was seen, and its noise, estimated if it is not given."""
-    mask = joints_of(mask_of(clip, missing))
-    seen = Seen(rows_of(encoding, clip, mask), mask, torch.zeros(len(clip), dtype=torch.bool))
-    levels = levels_of(seen) if noise is None else check_levels(noise)
-    seen.outliers = outliers_of(seen, levels)
-    return seen, levels
+    joints = mask_of(clip, missing)
+    return look(
+        rows_of(encoding, clip, joints), joints, None if noise is None else check_levels(noise)
+    )
 
 
 def job_of(
@@ -239,24 +235,16 @@ def calm(noise: NoiseLevels) -> bool:
     return noise.root_m < LEAST_ROOT and noise.angle_rad < LEAST_ANGLE
 
 
-def mended(before: Motion, after: Motion, job: Job) -> Motion:
-    """A clean motion; of a calm one only those frames that were not seen or not believed.
+def believed_joints(seen: Seen) -> Tensor:
+    """Which joints (frames, joints) of a clip were seen and believed."""
+    return seen.believed[:, 5::3]  # one channel of each joint
 
-    Over BORDER frames to both sides the recording fades into them; all others are as they were.
-    """
-    doubtful = (~job.seen.believed.all(1)).nonzero()[:, 0]
-    if not calm(job.noise) or not len(doubtful):
-        return after
-    away = (torch.arange(len(before))[:, None] - doubtful).abs().amin(1)
-    share = (1 - away / (BORDER + 1)).clamp(min=0).to(before.root_positions)[:, None]
-    turns = roma.rotmat_to_rotvec(before.rotations.mT @ after.rotations)
-    rotations = before.rotations @ roma.rotvec_to_rotmat(share[..., None] * turns)
-    return replace(
-        before,
-        root_positions=before.root_positions.lerp(after.root_positions, share),
-        rotations=torch.where(share[..., None, None] > 0, rotations, before.rotations),
-        contacts=None,
-    )
+
+def as_seen(before: Motion, after: Motion, believed: Tensor) -> Motion:
+    """A clean motion of a calm recording, which is right wherever it was believed, (frames, joints)."""
+    root = torch.where(believed[:, :1], before.root_positions, after.root_positions)
+    rotations = torch.where(believed[..., None, None], before.rotations, after.rotations)
+    return replace(after, root_positions=root, rotations=rotations)
 
 
 def resting(encoding: JointAngles, rows: Tensor, speed: float = 0.45) -> Tensor:

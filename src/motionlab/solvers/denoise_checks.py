@@ -13,14 +13,18 @@ from ..encodings import JointAngles
 from ..errors import SolverError
 from ..models import LstmGmm
 from ..motion import Motion
-from .denoise_seen import NEIGHBOURS, NoiseLevels
+from .denoise_seen import FEWEST, NoiseLevels
 from .denoise_windows import Settings
 from .window import METHODS
 
-FEWEST = NEIGHBOURS + 1  # frames; fewer do not tell noise from motion
 FARTHEST = (
     5.0  # m that a root may be from where it stands at rest, up or down: no one climbs farther
 )
+
+
+def called(clip: Motion) -> str:
+    """What a clip is called in words to a reader."""
+    return f"Clip {clip.name!r}" if clip.name else "The clip"
 
 
 def check_model(model: nn.Module) -> None:
@@ -52,9 +56,24 @@ def check_settings(how: Settings) -> None:
             f"{how.steps} steps, {how.rounds} rounds, batches of {how.batch}, a memory of {how.memory} "
             "frames: each must be 1 or more."
         )
+    if not (0 <= how.slow < math.inf and 0 < how.spread < math.inf):
+        raise SolverError(
+            f"slow is {how.slow} m/s and spread {how.spread} frames; both are numbers from 0 on, spread "
+            "above it."
+        )
+    if how.least is not None and not isinstance(how.least, int | float):
+        raise SolverError(f"least is {how.least!r}; it must be a number of nats a frame, or None.")
     if not all(0 <= weight < math.inf for weight in (how.prior, how.contact)):
         raise SolverError(
             f"prior {how.prior} and contact {how.contact} are factors, from 0 on, of two terms."
+        )
+
+
+def check_length(clip: Motion) -> None:
+    """Raise SolverError for a clip of too few frames."""
+    if len(clip) < FEWEST:
+        raise SolverError(
+            f"{called(clip)} has {len(clip)} frames, too few to tell noise from motion; {FEWEST} are needed."
         )
 
 
@@ -62,25 +81,22 @@ def check_clip(encoding: JointAngles, clip: Motion) -> None:
     """Raise SolverError for a clip that can't be cleaned as it is."""
     if not isinstance(clip, Motion):
         raise SolverError(f"denoise takes a Motion or a list of them, not {type(clip).__name__}.")
-    if len(clip) < FEWEST:
-        raise SolverError(
-            f"{clip!r} has too few frames to tell noise from motion; {FEWEST} are needed."
-        )
+    check_length(clip)
     if not encoding.skeleton.matches(clip.skeleton):
         raise SolverError(
-            f"{clip!r} is on another body than the model's: "
+            f"{called(clip)} is on another body than the model's: "
             f"{encoding.skeleton.difference(clip.skeleton)}. Take `solvers.clean_recording`, which "
             "cleans any rig, or motion.retarget()."
         )
     if abs(clip.fps - encoding.fps) > 1e-4 * encoding.fps:
         raise SolverError(
-            f"{clip!r}: the model knows motion at {encoding.fps:g} frames a second. Take "
+            f"{called(clip)}: the model knows motion at {encoding.fps:g} frames a second. Take "
             f"`solvers.clean_recording`, which cleans any rate, or motion.resample({encoding.fps:g})."
         )
     off = float((clip.root_positions[:, 1] - encoding.skeleton.rest_points[0, 1]).abs().median())
     if off > FARTHEST:
         raise SolverError(
-            f"{clip!r}: its root is {off:.0f} m above or below where it is when the body stands. Are "
+            f"{called(clip)}: its root is {off:.0f} m above or below where it is when the body stands. Are "
             "its lengths in metres, and is y up? read_bvh(path, units='mm') reads millimetres."
         )
 
@@ -109,22 +125,22 @@ def mask_of(clip: Motion, missing: Any) -> Tensor:
         mask = torch.as_tensor(missing)
     except (TypeError, ValueError, RuntimeError) as error:
         raise SolverError(
-            f"{clip!r}: missing must be an array of truth values: {error}."
+            f"{called(clip)}: missing must be an array of truth values: {error}."
         ) from error
     if mask.dtype != torch.bool or mask.shape not in ((frames,), (frames, joints)):
         raise SolverError(
-            f"{clip!r}: missing is {mask.dtype} of shape {tuple(mask.shape)}; it must be bool, "
+            f"{called(clip)}: missing is {mask.dtype} of shape {tuple(mask.shape)}; it must be bool, "
             f"({frames},) or ({frames}, {joints}), true where nothing was seen."
         )
     seen &= ~(mask if mask.ndim == 2 else mask[:, None])
     if int(seen.any(1).sum()) < FEWEST:
         raise SolverError(
-            f"{clip!r}: in all but {int(seen.any(1).sum())} frames all joints are missing; "
+            f"{called(clip)}: in all but {int(seen.any(1).sum())} frames all joints are missing; "
             f"{FEWEST} with something in them are needed."
         )
     if int(seen[:, 0].sum()) < FEWEST:
         raise SolverError(
-            f"{clip!r}: its root is missing in all but {int(seen[:, 0].sum())} frames, so nobody knows "
+            f"{called(clip)}: its root is missing in all but {int(seen[:, 0].sum())} frames, so nobody knows "
             f"where it goes; {FEWEST} are needed."
         )
     return seen
@@ -139,7 +155,7 @@ def start_of(clip: Motion, start: Any) -> Motion:
         or abs(start.fps - clip.fps) > 1e-4 * clip.fps
     ):
         raise SolverError(
-            f"{clip!r}: start is {start!r}; it must be a motion of the same body, rate and length."
+            f"{called(clip)}: start is {start!r}; it must be a motion of the same body, rate and length."
         )
     return start
 

@@ -1,28 +1,32 @@
 """A recording of any rig, at any rate, cleaned: `clean_recording`.
 
-The network knows one body at one rate. So a recording is brought there, cleaned, and what was corrected
-is brought back: each joint that the two bodies share gets the orientation of its clean like, and keeps,
-smoothly, what distinguishes it from that; the hips likewise. All other joints, fingers and face among
-them, keep their own rotations, and all bones their lengths. Where the recording has more frames than the
-network knows, the smooth line through all of them is what is corrected, at those frames that it knows.
+The network knows one body at one rate. A smooth line through the recording, on its own rig, is brought
+there, as no limb of it is bent the wrong way; what was seen is then put beside that line, each joint
+turned off it as on the rig. This is cleaned, and what the network corrects of the line is brought back
+to the line on the rig. Joints that the two bodies don't share, fingers and face among them, keep their
+own rotations, and all bones their lengths. Where the recording has more frames than the network knows,
+the line through all of them is what is corrected, at those frames that it knows.
 """
 
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import roma
 import torch
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import correlate1d
 from torch import Tensor, nn
 
-from ..errors import SolverError
+from ..errors import SkeletonError, SolverError
+from ..feet.contacts import label
+from ..filters import channel_mask, channels_of, joined
 from ..ik.turns import shortest_turn
 from ..io.bvh_units import ancestors, foot_to_head
+from ..models import LstmGmm
 from ..motion import Motion
 from ..retargeting import retarget
 from ..retargeting.flat_feet import Stance
@@ -34,25 +38,31 @@ from .denoise import (
     MODEL,
     Denoised,
     Done,
+    as_seen,
+    believed_joints,
+    calm,
     clean_jobs,
-    mended,
     needs_nothing,
     record_of,
-    see,
 )
-from .denoise_checks import FEWEST, check_clip, check_model, check_settings, mask_of
+from .denoise_checks import (
+    called,
+    check_clip,
+    check_length,
+    check_levels,
+    check_model,
+    check_settings,
+    mask_of,
+)
 from .denoise_seen import (
-    FPS,
-    LEAST_ANGLE,
-    LEAST_ROOT,
-    PUSH_ANGLE,
-    PUSH_ROOT,
     NoiseLevels,
     Seen,
     cross_validated,
+    known_everywhere,
+    look,
     motion_of,
+    rows_of,
     smooth,
-    whittaker,
 )
 from .denoise_windows import Job, Settings
 
@@ -92,87 +102,141 @@ def clean_recording(
     check_model(model)
     check_settings(how)
     encoding, begin = model.encoding, time.process_time()
-    if not isinstance(motion, Motion) or len(motion) < FEWEST:
-        raise SolverError(
-            f"{motion!r} is no motion of {FEWEST} frames or more; fewer do not tell noise from motion."
-        )
+    if not isinstance(motion, Motion):
+        raise SolverError(f"clean_recording takes a Motion, not {type(motion).__name__}.")
+    check_length(motion)
     size = foot_to_head(motion.skeleton)
     if size is not None and not SMALLEST < size < LARGEST:
         raise SolverError(
-            f"{motion!r} is of a body of {size:.3g} m from foot to head. Are lengths in metres? "
+            f"{called(motion)} is of a body of {size:.3g} m from foot to head. Are lengths in metres? "
             "read_bvh(path, units='mm') reads millimetres."
         )
-    unseen = ~mask_of(motion, missing)
-    if motion.skeleton.matches(encoding.skeleton):
-        body, hidden = motion, unseen
-    else:
-        # feet of noisy motion rest nowhere: holding them would bend what was seen
-        loose = replace(motion, contacts=torch.zeros(len(motion), 4, dtype=torch.bool))
-        body = retarget(loose, encoding.skeleton, reference=reference)
-        hidden = _theirs(unseen, motion.skeleton, encoding.skeleton)
+    there = mask_of(motion, missing)
+    known = known_everywhere(motion, there)
+    numbers, mean = channels_of(known)
+    levels = None if noise is None else check_levels(noise)
+    seen, levels = look(torch.from_numpy(numbers), there, levels)
+    own = Job(seen, levels, seen.rows, cross_validated(seen, levels, motion.fps))
+    line = _own_where_not_shared(
+        known, joined(motion, own.line.numpy(), mean), believed_joints(seen), encoding.skeleton
+    )
+    body, on_body = _brought_over(known, line, encoding.skeleton, reference, how.slow)
     check_clip(encoding, body.resample(encoding.fps))
-    job, done, rows = _cleaned(model, body, noise, hidden, how, progress)
-    if done.way == "unchanged":
-        found = motion
+    if needs_nothing(own):
+        nan = float("nan")
+        found, done = motion, Done(seen.rows, "unchanged", nan, nan, None)
     else:
-        after = replace(motion_of(encoding, rows, body), fps=body.fps)
-        found = after if body is motion else brought_back(motion, body, after, job.noise, unseen)
-        found = mended(motion, found, job)
+        joints = ~_theirs(~there, motion.skeleton, encoding.skeleton)
+        rows = rows_of(encoding, replace(on_body, fps=encoding.fps))
+        scale = limb_length(body.skeleton, "leg") / limb_length(motion.skeleton, "leg")
+        theirs = NoiseLevels(scale * levels.root_m, levels.angle_rad)
+        its = Seen(rows, channel_mask(joints), seen.outliers)
+        done = _cleaned(model, its, theirs, motion.fps, how, progress)
+        found = line
+        if done.way == "map":
+            after = replace(motion_of(encoding, done.rows, body), fps=body.fps)
+            same = motion.skeleton.matches(encoding.skeleton)
+            found = after if same else brought_back(line, body, after)
+        if calm(levels):
+            found = as_seen(motion, found, believed_joints(seen))
+        found = replace(found, contacts=None)
     seconds = time.process_time() - begin
-    return Denoised(found, record_of(motion, found, ~unseen, job, done, noise is None, seconds))
+    return Denoised(found, record_of(motion, found, there, own, done, noise is None, seconds))
+
+
+def _brought_over(
+    known: Motion, line: Motion, body: Skeleton, reference: Motion | Stance | None, slow: float
+) -> tuple[Motion, Motion]:
+    """A smooth line on the network's body, and what was seen beside it, as far off it as on the rig.
+
+    slow : m/s of a foot that rests in the line.
+    """
+    if known.skeleton.matches(body):
+        return line, known
+    with suppress(SkeletonError):  # a rig that lacks a foot: retarget tells of it
+        # feet stand flat on the floor there, or the network would not know it for a walk
+        line = replace(line, contacts=label(line, "speed-height", speed=slow))
+    over = replace(retarget(line, body, reference=reference), contacts=None)
+    off = known.orientations() @ line.orientations().mT
+    roles, own = body.roles, known.skeleton.roles
+    shared = {joint: own[role] for role, joint in roles.items() if role in own}
+    world, local, turned = over.orientations(), over.rotations.clone(), []
+    for joint, parent in enumerate(body.parents):
+        above = turned[parent] if parent >= 0 else torch.eye(3).expand(len(known), 3, 3)
+        if joint in shared:
+            local[:, joint] = above.mT @ off[:, shared[joint]] @ world[:, joint]
+        turned.append(above @ local[:, joint])
+    scale = limb_length(body, "leg") / limb_length(known.skeleton, "leg")
+    moved = (known.positions() - line.positions())[:, own["hips"]]
+    place = over.root_positions + scale * moved
+    return over, replace(over, root_positions=place, rotations=local)
+
+
+def _own_where_not_shared(known: Motion, line: Motion, believed: Tensor, body: Skeleton) -> Motion:
+    """The line, but joints that the network's body has no like of as they were seen and believed."""
+    roles = known.skeleton.roles
+    shared = {joint: 0 for role, joint in roles.items() if role in body.roles}
+    moved = {0, *shared, *_between_joints(known.skeleton, shared)}
+    others = torch.tensor([joint not in moved for joint in range(known.skeleton.joints)])
+    keep = (believed & others)[..., None, None]
+    return replace(line, rotations=torch.where(keep, known.rotations, line.rotations))
 
 
 def _cleaned(
-    model: nn.Module,
-    body: Motion,
-    noise: tuple | None,
-    hidden: Tensor,
-    how: Settings,
-    progress: bool,
-) -> tuple[Job, Done, Tensor]:
-    """The job of a motion on the model's body, what came of it, and its rows at the motion's rate."""
-    encoding = model.encoding
-    seen, levels = see(encoding, replace(body, fps=encoding.fps), noise, hidden)
-    line, calm = smooth(seen, levels, body.fps), cross_validated(seen, levels, body.fps)
-    if abs(body.fps - encoding.fps) <= 1e-4 * encoding.fps:
-        job = Job(seen, levels, line, calm)
-        (done,) = clean_jobs(model, [job], how, progress=progress)
-        return job, done, done.rows
-    own = torch.arange(len(line)).double() / body.fps
-    known = torch.arange(int(own[-1] * encoding.fps + 1e-6) + 1).double() / encoding.fps
-    few, fewer = _at(own, known, seen, levels, body.fps / encoding.fps)
-    at = lambda rows: _between(own, rows, known)
-    job = Job(few, fewer, at(line), at(calm))
-    whole = Job(seen, levels, line, calm)
-    if needs_nothing(whole):
-        nan = float("nan")
-        return whole, Done(seen.rows, "unchanged", nan, nan, None), seen.rows
-    (done,) = clean_jobs(model, [job], how, progress=progress, always=True)
-    if done.way == "filter":
-        return whole, done, calm
-    change = CubicSpline(known.numpy(), (done.rows - at(line)).numpy(), bc_type="natural")
+    model: LstmGmm, seen: Seen, levels: NoiseLevels, fps: float, how: Settings, progress: bool
+) -> Done:
+    """What came of a recording on the network's body; rows at the recording's rate."""
+    rate = model.encoding.fps
+    line = smooth(seen, levels, fps)
+    if abs(fps - rate) <= 1e-4 * rate:
+        return clean_jobs(
+            model, [Job(seen, levels, line, line)], how, progress=progress, always=True
+        )[0]
+    own = torch.arange(len(line)).double() / fps
+    known = torch.arange(int(own[-1] * rate + 1e-6) + 1).double() / rate
+    few, fewer = _at(own, known, seen, levels, fps / rate)
+    start = _between(own, line, known)
+    (done,) = clean_jobs(
+        model, [Job(few, fewer, start, start)], how, progress=progress, always=True
+    )
+    change = CubicSpline(known.numpy(), (done.rows - start).numpy(), bc_type="natural")
     change = torch.from_numpy(change(np.clip(own.numpy(), 0, float(known[-1]))))
-    return whole, done, line + change
+    return done._replace(rows=line + change)
 
 
 def _at(
     own: Tensor, known: Tensor, seen: Seen, levels: NoiseLevels, times: float
 ) -> tuple[Seen, NoiseLevels]:
-    """What was seen at the network's moments, each the mean of `times` frames around it, if so many are."""
-    width = max(1, round(times))
+    """What was seen at the network's moments, each the mean of the frames about it that belong to it."""
+    shares = _shares(times)
+    mean = lambda x: correlate1d(x, shares, axis=0, mode="nearest")
     believed = seen.believed.double().numpy()
-    mean = lambda x: uniform_filter1d(x, width, axis=0, mode="nearest")
     weight = mean(believed)
     rows = mean(believed * seen.rows.numpy()) / np.maximum(weight, 1e-9)
     rows = np.where(weight > 1e-6, rows, seen.rows.numpy())
     nearest = (known * (1 / (own[1] - own[0]))).round().long().clamp(max=len(own) - 1)
-    mask = torch.from_numpy(weight > 0.5 / width)[nearest]
+    mask = torch.from_numpy(weight > shares.min() / 2)[nearest]
     found = Seen(
         _between(own, torch.from_numpy(rows), known),
         mask,
         torch.zeros(len(known), dtype=torch.bool),
     )
-    return found, NoiseLevels(*(level / width**0.5 for level in levels))
+    left = noise_left(times)
+    return found, NoiseLevels(*(level * left for level in levels))
+
+
+def _shares(times: float) -> np.ndarray:
+    """Of frames about one, for so many of them to each of the network's; as many before it as after."""
+    half = max(times, 1.0) / 2
+    reach = np.arange(-round(half), round(half) + 1)
+    inside = np.minimum(reach + 0.5, half) - np.maximum(reach - 0.5, -half)
+    shares = inside.clip(0)
+    return shares / shares.sum()
+
+
+def noise_left(times: float) -> float:
+    """What is left of the deviation of white noise in means of so many frames."""
+    return float(np.square(_shares(times)).sum() ** 0.5)
 
 
 def _between(own: Tensor, rows: Tensor, known: Tensor) -> Tensor:
@@ -198,48 +262,33 @@ def _theirs(unseen: Tensor, own: Skeleton, body: Skeleton) -> Tensor:
     return hidden
 
 
-def brought_back(
-    motion: Motion, before: Motion, after: Motion, noise: NoiseLevels, unseen: Tensor
-) -> Motion:
+def brought_back(line: Motion, before: Motion, after: Motion) -> Motion:
     """A motion of any rig with what was corrected on the network's body.
 
-    Parameters
-    ----------
-    motion : the recording; before : the same on the network's body; after : cleaned there.
-    noise : on that body. unseen : (frames, joints) of the recording, what is not to be looked at.
+    line : on the rig; before : the same on the network's body; after : cleaned there. How a limb turns
+    about itself stays as in the line: it can't be told of a straight limb on the other body.
     """
-    own, body = motion.skeleton, before.skeleton
-    world, old, new = motion.orientations(), before.orientations(), after.orientations()
+    own, body = line.skeleton, before.skeleton
+    turn = after.orientations() @ before.orientations().mT
     shared = {own.roles[role]: joint for role, joint in body.roles.items() if role in own.roles}
     own_role = {joint: role for role, joint in own.roles.items()}
-    between = _between_joints(own, shared)
-    rate = (FPS / motion.fps) ** 1.5
-    stiff = (max(noise.angle_rad, LEAST_ANGLE) / (PUSH_ANGLE * rate)) ** 2
-    local, turned = motion.rotations.clone(), []
+    world, local, turned = line.orientations(), line.rotations.clone(), []
     for joint, parent in enumerate(own.parents):
-        above = turned[parent] if parent >= 0 else torch.eye(3).expand(len(motion), 3, 3)
+        above = turned[parent] if parent >= 0 else torch.eye(3).expand(len(line), 3, 3)
         if joint in shared:
-            like = shared[joint]
-            apart = _smooth_turns(old[:, like].mT @ world[:, joint], ~unseen[:, joint], stiff)
-            found = new[:, like] @ apart
+            found = turn[:, shared[joint]] @ world[:, joint]
             if below := _BONES.get(own_role[joint]):
-                # how a limb turns about itself is lost on the other body where it is straight
                 bone = own.below(own_role[joint], below)[:, None]
-                still = above @ _smooth_turns(local[:, joint], ~unseen[:, joint], stiff)
+                still = above @ local[:, joint]
                 found = shortest_turn((still @ bone)[..., 0], (found @ bone)[..., 0]) @ still
             local[:, joint] = above.mT @ found
-        elif joint in between:
-            local[:, joint] = _smooth_turns(local[:, joint], ~unseen[:, joint], stiff)
         turned.append(above @ local[:, joint])
     hips, their = own.roles["hips"], body.roles["hips"]
     scale = limb_length(body, "leg") / limb_length(own, "leg")
-    apart = scale * motion.positions()[:, hips] - before.positions()[:, their]
-    stiff = torch.tensor((max(noise.root_m, LEAST_ROOT) / (PUSH_ROOT * rate)) ** 2).expand(3)
-    apart = whittaker(apart, (~unseen[:, [hips]]).expand(-1, 3), stiff).float()
-    place = (after.positions()[:, their] + apart) / scale
-    found = replace(motion, rotations=local, contacts=None)
-    moved = place - found.positions()[:, hips]
-    return replace(found, root_positions=found.root_positions + moved)
+    moved = (after.positions() - before.positions())[:, their] / scale
+    found = replace(line, rotations=local, contacts=None)
+    place = line.positions()[:, hips] + moved
+    return replace(found, root_positions=found.root_positions + place - found.positions()[:, hips])
 
 
 def _between_joints(skeleton: Skeleton, shared: dict[int, int]) -> set[int]:
@@ -250,11 +299,3 @@ def _between_joints(skeleton: Skeleton, shared: dict[int, int]) -> set[int]:
         if skeleton.roles["hips"] in way:
             found |= {*way[: way.index(skeleton.roles["hips"])]}
     return found - {*shared}
-
-
-def _smooth_turns(turns: Tensor, seen: Tensor, stiffness: float) -> Tensor:
-    """Turns (frames, 3, 3) that hardly change, smoothed about their mean."""
-    mean = roma.special_procrustes(turns[seen].mean(0) if seen.any() else turns.mean(0))
-    off = roma.rotmat_to_rotvec(mean.mT @ turns)
-    smooth_off = whittaker(off, seen[:, None].expand(-1, 3), torch.tensor(stiffness).expand(3))
-    return mean @ roma.rotvec_to_rotmat(smooth_off).float()

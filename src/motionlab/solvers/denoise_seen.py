@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from scipy.linalg import solveh_banded
 from torch import Tensor
+from torch.nn.functional import max_pool1d
 
 from ..encodings import JointAngles
 from ..encodings.path import steps_between
+from ..filters import channel_mask, filled, smooth_lines, unwrapped
 from ..kinematics import heading
 from ..motion import Motion
 
@@ -30,10 +31,11 @@ FPS = 30.0  # of what is said a frame
 PUSH_ROOT, PUSH_ANGLE = 0.0035, 0.016
 # Times these, that a clip may ask for, and how near to the least error is enough; see `cross_validated`.
 FREEDOMS, FOLDS, NEARLY = (0.5, 1.0, 2.0, 4.0, 8.0), 4, 0.03
-# A frame is an outlier if it is so many spreads farther than usual from its neighbours' median, and more
-# than so many times the noise, or m and rad where there is less noise: no body jumps like that.
-OUTLIER, FAR, FAR_ROOT, FAR_ANGLE = 6.0, 2.5, 0.015, 0.05
-NEIGHBOURS = 7  # frames whose median a frame is held against
+# A frame is an outlier if it is so many spreads off the way between those about it, root mean square over
+# channels. A spread is not under that of the noise, nor under m and rad that bodies do within a frame.
+FAR, FAR_ROOT, FAR_ANGLE = 3.5, 0.015, 0.05
+ALONE = 3  # frames; of outliers that are as near to each other the farthest is judged first
+FEWEST = 8  # frames; fewer do not tell noise from motion
 
 
 class NoiseLevels(NamedTuple):
@@ -63,14 +65,24 @@ class Seen:
 def rows_of(encoding: JointAngles, motion: Motion, mask: Tensor | None = None) -> Tensor:
     """Rows (frames, channels) of a motion on the encoding's body, float64.
 
-    mask : bool, like rows, what was seen; the yaw turns on from one frame that was to the next.
+    mask : bool, (frames, joints), what was seen; what was not is as `known_everywhere` has it. Turns go
+    on from frame to frame, beyond half a turn if need be.
     """
+    motion = motion if mask is None else known_everywhere(motion, mask)
     features = encoding.encode(motion).double()
-    yaw = heading(motion.rotations[:, 0].double())
-    there = torch.ones(len(yaw), dtype=torch.bool) if mask is None else mask[:, YAW]
-    yaw[there] = torch.from_numpy(np.unwrap(yaw[there].numpy()))
-    pose = features[:, encoding.slices["pose"]]
-    return torch.cat([motion.root_positions.double(), yaw[:, None], features[:, 4:6], pose], dim=1)
+    yaw = torch.from_numpy(np.unwrap(heading(motion.rotations[:, 0].double()).numpy()))
+    pose = features[:, encoding.slices["pose"]].unflatten(1, (-1, 3))
+    tilt = features[:, 4:6]
+    return torch.cat(
+        [motion.root_positions.double(), yaw[:, None], tilt, unwrapped(pose).flatten(1)], dim=1
+    )
+
+
+def known_everywhere(motion: Motion, mask: Tensor) -> Motion:
+    """A motion with what was not seen filled; a joint that never was, (frames, joints), is at rest."""
+    never = ~mask.any(0)
+    rotations = torch.where(never[:, None, None], torch.eye(3), motion.rotations)
+    return filled(replace(motion, rotations=rotations), ~(mask | never))
 
 
 def features_of(encoding: JointAngles, rows: Tensor, contacts: Tensor | None) -> Tensor:
@@ -89,10 +101,18 @@ def motion_of(encoding: JointAngles, rows: Tensor, like: Motion | None = None) -
     return replace(found, contacts=None)
 
 
-def joints_of(mask: Tensor) -> Tensor:
-    """A mask (frames, joints) for channels (frames, channels): the root's six, three of each other."""
-    root, others = mask[:, :1].expand(-1, 6), mask[:, 1:].repeat_interleave(3, dim=1)
-    return torch.cat([root, others], dim=1)
+def look(
+    rows: Tensor, joints: Tensor, noise: NoiseLevels | None = None
+) -> tuple[Seen, NoiseLevels]:
+    """Rows (frames, channels) as they were seen, and their noise, estimated if it is not given.
+
+    joints : bool (frames, joints), what was seen. Outliers are no noise, so both are found twice.
+    """
+    seen = Seen(rows, channel_mask(joints), torch.zeros(len(rows), dtype=torch.bool))
+    for _ in range(2):
+        levels = levels_of(seen) if noise is None else noise
+        seen.outliers = outliers_of(seen, levels)
+    return seen, levels_of(seen) if noise is None else noise
 
 
 def levels_of(seen: Seen) -> NoiseLevels:
@@ -104,7 +124,7 @@ def levels_of(seen: Seen) -> NoiseLevels:
     size = math.sqrt(math.comb(2 * ORDER, ORDER))
     found = []
     for channels in (ROOT, TURNS):
-        rows, seen_there = seen.rows[:, channels], seen.mask[:, channels]
+        rows, seen_there = seen.rows[:, channels], seen.believed[:, channels]
         whole = seen_there.unfold(0, ORDER + 1, 1).all(-1)
         each = torch.where(whole, rows.diff(n=ORDER, dim=0).abs() / size, torch.nan)
         each = 1.4826 * each.nanmedian(dim=0).values
@@ -114,20 +134,44 @@ def levels_of(seen: Seen) -> NoiseLevels:
 
 
 def outliers_of(seen: Seen, noise: NoiseLevels) -> Tensor:
-    """Frames (frames,) that lie far from the median of those about them."""
-    frames = len(seen.rows)
-    if frames < NEIGHBOURS:
-        return torch.zeros(frames, dtype=torch.bool)
-    half = NEIGHBOURS // 2
-    rows = torch.where(seen.mask, seen.rows, torch.nan)
-    padded = torch.cat([rows[:1].expand(half, -1), rows, rows[-1:].expand(half, -1)])
-    off = rows - padded.unfold(0, NEIGHBOURS, 1).nanmedian(-1).values
-    scale = torch.full((rows.shape[1],), max(noise.angle_rad, FAR_ANGLE)).double()
-    scale[ROOT] = max(noise.root_m, FAR_ROOT)
-    far = (off / scale).square().nanmean(1).sqrt()
-    usual = far.nanmedian()
-    spread = 1.4826 * (far - usual).abs().nanmedian()
-    return (far > usual + OUTLIER * torch.maximum(spread, 0.25 * usual)) & (far > FAR)
+    """Frames (frames,) that jump: far off the straight way between those about them.
+
+    Each channel's distance is measured by its own median over frames, so that whoever moves fast jumps
+    nowhere. A frame that is wrong makes its neighbours look so; the farthest of some is taken first,
+    and then they are held against those beyond it.
+    """
+    spread = torch.full((seen.rows.shape[1],), max(noise.angle_rad, FAR_ANGLE / 1.2)).double()
+    spread[ROOT] = max(noise.root_m, FAR_ROOT / 1.2)
+    spread *= math.sqrt(1.5)  # two neighbours' noise is on the way, too
+    found = torch.zeros(len(seen.rows), dtype=torch.bool)
+    for _ in found:
+        there = seen.mask & ~found[:, None]
+        off = torch.where(there, seen.rows - _way_between(seen.rows, there), torch.nan).abs()
+        usual = 1.4826 * off.nanmedian(0).values.nan_to_num()
+        far = (off / torch.maximum(spread, usual)).square().nanmean(1).sqrt().nan_to_num()
+        farthest = max_pool1d(far[None, None], 2 * ALONE + 1, 1, ALONE)[0, 0]
+        more = (far > FAR) & (far == farthest)
+        if not more.any():
+            break
+        found |= more
+    return found
+
+
+def _way_between(rows: Tensor, there: Tensor) -> Tensor:
+    """Of each channel the point on the line from the last frame that is there to the next one.
+
+    Beyond the first and the last, what is nearest.
+    """
+    frames = len(rows)
+    index = torch.arange(frames)[:, None].expand_as(rows)
+    none = torch.full_like(index[:1], -1)
+    last = torch.cat([none, torch.where(there, index, -1).cummax(0).values[:-1]])
+    following = torch.where(there, index, frames).flip(0).cummin(0).values.flip(0)
+    following = torch.cat([following[1:], none + 1 + frames])
+    before = torch.where(last < 0, following, last).clamp(max=frames - 1)
+    after = torch.where(following >= frames, before, following)
+    part = (index - before).double() / (after - before).clamp(min=1)
+    return torch.lerp(rows.gather(0, before), rows.gather(0, after), part.clamp(0, 1))
 
 
 def smooth(
@@ -139,20 +183,19 @@ def smooth(
 ) -> Tensor:
     """Rows (frames, channels) on a line with as little acceleration as what was seen allows.
 
-    For each channel that is ``min Σ (seen - x)² / σ² + Σ (x'')² / a²``, what a Kalman smoother finds
-    for a body that is pushed at random (Whittaker 1923 found it before). Where nothing was seen it
-    goes on as its ends ask; where nothing of a channel was seen at all it is 0, the mean pose.
+    For each channel that is ``min Σ (seen - x)² / σ² + ∫ x''² / a²``, what a Kalman smoother finds for
+    a body that is pushed at random; see `filters.kalman`. Where nothing was seen it goes on as its ends
+    ask; where nothing of a channel was seen at all it is 0, the mean pose.
 
-    times : factors on a, of the root and of angles. counts : (frames,), 0 where a frame is left out.
+    times : factors on a, of the root and of angles. counts : bool (frames,), false where a frame is
+    left out.
     """
-    believed = seen.believed.double()
-    if counts is not None:
-        believed = believed * counts[:, None]
+    believed = seen.believed if counts is None else seen.believed & counts[:, None]
     pushes = torch.full((seen.rows.shape[1],), PUSH_ANGLE * times[1]).double()
     levels = torch.full_like(pushes, max(noise.angle_rad, LEAST_ANGLE))
     pushes[ROOT], levels[ROOT] = PUSH_ROOT * times[0], max(noise.root_m, LEAST_ROOT)
     pushes *= (FPS / fps) ** 1.5  # pushes without a memory add up so
-    return whittaker(seen.rows, believed, (levels / pushes).square())
+    return smooth_lines(seen.rows, believed, (levels / pushes).square())
 
 
 def cross_validated(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:
@@ -166,37 +209,9 @@ def cross_validated(seen: Seen, noise: NoiseLevels, fps: float = FPS) -> Tensor:
     off = torch.zeros(len(FREEDOMS), 2).double()
     for i, times in enumerate(FREEDOMS):
         for fold in range(FOLDS):
-            line = smooth(seen, noise, fps, (times, times), (held != fold).double())
+            line = smooth(seen, noise, fps, (times, times), held != fold)
             gaps = ((seen.rows - line).square() * seen.believed)[held == fold]
             off[i] += torch.stack([gaps[:, ROOT].sum(), gaps[:, TURNS].sum()])
     enough = off <= (1 + NEARLY) * off.min(0).values
     root, angles = (FREEDOMS[i] for i in enough.int().argmax(0).tolist())  # the first that is
     return smooth(seen, noise, fps, (root, angles))
-
-
-def whittaker(rows: Tensor, weights: Tensor, stiffness: Tensor) -> Tensor:
-    """The smooth line through each channel of rows (frames, channels).
-
-    weights : like rows, 0 for what does not count. stiffness : (channels,), of its second difference.
-    """
-    frames = len(rows)
-    if frames < 3:
-        return rows.clone()
-    bands = np.zeros((3, frames))  # of DᵀD, as solveh_banded reads them: the diagonal last
-    for at, one in enumerate((1.0, -2.0, 1.0)):
-        for other, two in enumerate((1.0, -2.0, 1.0)[: at + 1]):
-            bands[2 - (at - other), at : at + frames - 2] += one * two
-    found = np.zeros(rows.shape)
-    values, weights, stiffness = (x.double().numpy() for x in (rows, weights, stiffness))
-    groups: dict[bytes, list[int]] = {}
-    for channel in range(rows.shape[1]):
-        key = weights[:, channel].tobytes() + stiffness[channel].tobytes()
-        groups.setdefault(key, []).append(channel)
-    for channels in groups.values():
-        weight = weights[:, channels[0]]
-        if np.count_nonzero(weight) < 2:
-            continue
-        matrix = stiffness[channels[0]] * bands
-        matrix[2] += weight + 1e-9
-        found[:, channels] = solveh_banded(matrix, weight[:, None] * values[:, channels])
-    return torch.from_numpy(found)

@@ -22,9 +22,6 @@ from .energy import Before, Energy
 from .window import Search, descend
 
 _TILT, _STEP = slice(4, 6), 3  # channels of features: tilt; the first ones are the step's
-# Frames over which a change spreads to both sides; what is sought is as smooth as the line that it is
-# added to, so that little noise can come back with it.
-SPREAD = 1.5
 LOOSE = 0.5  # of the noise, by which a window may begin elsewhere than the smooth line
 
 
@@ -41,6 +38,11 @@ class Settings:
     method, steps : of `window.solve`, in each round.
     batch : windows that are solved side by side.
     prior, contact : factors on these terms (eq. 16, 19), 0 leaves one out. The observation's is 1.
+    slow : m/s below which a toe is taken to rest while noise is still left on it; labels have 0.45.
+    spread : frames over which a change spreads to both sides; what is sought is as smooth as the line
+        that it is added to, so that little noise can come back with it.
+    least : nats a frame that the likeliest motion must have, or a smooth line comes back; -inf: it never
+        does. None: as `denoise_known` has it.
     disturbed : whether the network's inputs may be disturbed, d of eq. 17.
     first_state : whether the memory before a clip's first frame is found by gradient (eq. 27).
     """
@@ -54,6 +56,9 @@ class Settings:
     batch: int = 32
     prior: float = 0.4
     contact: float = 1.0
+    slow: float = 0.6
+    spread: float = 1.5
+    least: float | None = None
     disturbed: bool = False
     first_state: bool = False
 
@@ -257,7 +262,7 @@ class _FromSomewhere(Search):
     ) -> None:
         super().__init__(energy, s, d)
         frames = torch.arange(s.shape[1]).to(s)
-        near = (-((frames[:, None] - frames) / SPREAD).square() / 2).exp()
+        near = (-((frames[:, None] - frames) / how.spread).square() / 2).exp()
         self.lasting = near / near.square().sum(1, keepdim=True).sqrt()
         root, angle = levels.float().T
         std = energy.model.normalizer.std

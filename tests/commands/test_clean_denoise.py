@@ -1,0 +1,92 @@
+"""`motionlab clean --denoise`: what is told, what is written, what the report shows."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+import torch
+
+from motionlab import corrupt, read_bvh, write_bvh
+from motionlab.__main__ import main
+from motionlab.commands.clean_report import write_report
+from motionlab.datasets import gaits
+
+WALK = gaits.make(seconds=2, speed=1.2, name="walk")
+WILD = [20, 41]
+
+
+def with_wild(motion):
+    """Two frames in which the body is elsewhere."""
+    places = motion.root_positions.clone()
+    places[WILD] += torch.tensor([0.6, 0.0, 0.4])
+    return replace(motion, root_positions=places)
+
+
+def knees(motion):
+    """Angles (frames, 2) of both knees; 0 is straight."""
+    points, role = motion.positions(), motion.skeleton.role
+    found = []
+    for side in ("left", "right"):
+        hip, knee, foot = (
+            points[:, role(f"{side}_{part}")] for part in ("upper_leg", "lower_leg", "foot")
+        )
+        cosine = torch.cosine_similarity(knee - hip, foot - knee, dim=-1)
+        found.append(cosine.clamp(-1, 1).arccos().rad2deg())
+    return torch.stack(found, 1)
+
+
+def test_frames_that_jump_are_told_and_alone_changed(here, capsys):
+    write_bvh(with_wild(WALK), "wild.bvh")
+    assert (
+        main(["clean", "wild.bvh", "--denoise", "auto", "--out", "x.bvh", "--report", "x.html"])
+        == 0
+    )
+    said = capsys.readouterr().out
+    assert "2 frames not believed (20, 41)" in said and "only these frames were changed" in said
+    moved = (read_bvh("x.bvh").positions() - WALK.positions()).norm(dim=-1).amax(1)
+    assert moved.max() < 0.05
+    moved[WILD] = 0
+    assert moved.max() < 1e-4
+    page = (here / "x.html").read_text()
+    assert "2 frames that were not believed" in page and page.count('class="wild"') >= 2
+
+
+def test_three_frames_are_refused_in_words(here, capsys):
+    write_bvh(WALK[:3], "short.bvh")
+    assert main(["clean", "short.bvh", "--denoise", "auto", "--out", "x.bvh"]) == 1
+    said = capsys.readouterr().err
+    assert "Clip 'short' has 3 frames, too few to tell noise from motion; 8 are needed" in said
+    assert "Motion(" not in said
+
+
+def test_feet_that_are_held_after_it_leave_knees_as_they_are(here):
+    """Legs nearly straight, on a rig that is no other's: the body does not come down for its feet."""
+    skeleton = WALK.skeleton
+    legs = torch.tensor(["Leg" in name or "Foot" in name for name in skeleton.names])
+    rig = replace(skeleton, offsets=torch.where(legs[:, None], 1.12, 0.97) * skeleton.offsets)
+    truth = replace(WALK, skeleton=rig, root_positions=1.1 * WALK.root_positions, contacts=None)
+    seen = corrupt.tremble(truth, 0.01, 0.04, generator=torch.Generator().manual_seed(0))
+    write_bvh(seen, "noisy.bvh")
+    assert main(["clean", "noisy.bvh", "--denoise", "auto", "--out", "calm.bvh"]) == 0
+    assert main(["clean", "noisy.bvh", "--denoise", "auto", "--feet", "--out", "held.bvh"]) == 0
+    calm, held = read_bvh("calm.bvh"), read_bvh("held.bvh")
+    off = lambda motion: 100 * float((motion.positions() - truth.positions()).norm(dim=-1).mean())
+    assert off(held) < off(calm) + 0.3 < off(seen)
+    assert (knees(held) - knees(calm)).abs().mean() < 5
+    assert (held.root_positions - calm.root_positions)[:, 1].min() > -0.015
+
+
+@pytest.mark.parametrize("wild", [[], WILD])
+def test_curves_are_scaled_by_frames_that_were_believed(wild, tmp_path):
+    """A frame that is 72 cm off would press a tremble of a centimetre flat; the table leaves it out."""
+    seen = corrupt.tremble(WALK, 0.01, 0.0, generator=torch.Generator().manual_seed(0))
+    write_report(with_wild(seen), WALK, ["said"], tmp_path / "x.html", wild)
+    page = (tmp_path / "x.html").read_text()
+    highest = float(re.search(r'<text x="0" y="16">(\d+) cm', page)[1])
+    most = [
+        float(row) for row in re.findall(r"<tr><td>[^<]+</td><td>[\d.]+</td><td>([\d.]+)", page)
+    ]
+    assert len(most) == WALK.skeleton.joints
+    assert (highest < 5 and max(most) < 5) if wild else (highest > 60 and min(most) > 60)
