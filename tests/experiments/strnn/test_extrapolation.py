@@ -111,7 +111,9 @@ def test_a_verdict_is_of_the_noise_that_was_chosen_and_of_the_same_without_resid
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Prepared, "find", lambda name: walks)
     network = build(walks, PRESETS["strnn-temporal-hy"]["smoke"])
-    torch.nn.init.normal_(network.filter[-1].weight, std=0.5, generator=torch.Generator().manual_seed(3))
+    torch.nn.init.normal_(
+        network.filter[-1].weight, std=0.5, generator=torch.Generator().manual_seed(3)
+    )
     save_weights("some.safetensors", network, {"name": "strnn-temporal-hy"})
     (tmp_path / "val.json").write_text(json.dumps(validated({0.02: loop(), 0.05: loop()})))
     extrapolation.main(
