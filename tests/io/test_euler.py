@@ -66,3 +66,15 @@ def test_unrolled_angles_are_the_same_turns_and_do_not_jump():
 def test_one_frame_has_nothing_to_unroll():
     angles = np.zeros((1, 2, 3))
     np.testing.assert_array_equal(unrolled(angles), angles)
+
+
+def test_a_frame_without_any_turn_stays_zero_and_is_gone_on_from():
+    """Files begin with one, and readers know it by its zeros."""
+    bent = np.full((3, 2, 3), 3.0)
+    angles = np.concatenate([bent[:1], np.zeros((1, 2, 3)), bent, np.zeros((1, 2, 3))])
+    found = unrolled(angles)
+    np.testing.assert_array_equal(found[[1, 5]], 0)
+    orders = ("XYZ", "ZYX")
+    np.testing.assert_allclose(
+        from_euler(np.rad2deg(found), orders), from_euler(np.rad2deg(angles), orders), atol=1e-6
+    )

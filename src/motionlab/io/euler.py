@@ -51,8 +51,14 @@ def unrolled(angles: np.ndarray) -> np.ndarray:
 
     Of three angles about different axes there is another triple, with half a turn more of the first and
     the third and the second mirrored, and whole turns on top. Each frame has what is nearest to the one
-    before; the first stays.
+    before; the first stays, and so does one without any turn, which readers know by its zeros.
     """
+    rests = np.flatnonzero((np.abs(angles) < 1e-6).all(axis=(1, 2)))
+    return np.concatenate([_followed(piece) for piece in np.split(angles, rests)])
+
+
+def _followed(angles: np.ndarray) -> np.ndarray:
+    """`unrolled` from a first frame that stays."""
     if len(angles) < 2:
         return angles
     others = angles * [1, -1, 1] + np.pi
