@@ -17,7 +17,7 @@ const NEAR = [...OF_HANDS, "help", "lock", "refined"]; // those that stand right
 const ROOMY = "(min-width: 481px)"; // a window in which all of them do
 
 const make = (tag, className, text = "") => Object.assign(document.createElement(tag), { className, textContent: text });
-const degrees = (angle) => Math.round((180 * angle) / Math.PI);
+const degrees = (angle) => Math.round((180 * Math.atan2(Math.sin(angle), Math.cos(angle))) / Math.PI); // within half a turn
 
 export class SteerFigure {
   /** `content` as motionlab/viewer/live/steer_settings.py writes it; `still` is an image URL. */
