@@ -5,6 +5,8 @@
 * References are a list whose entries are no list items: no list.
 * The search button is named "Search" and says "Search Ctrl+K"; the names of the colour button's
   pictures would do as well as its own.
+* A table that is wider than the page scrolls, but not by keys.
+* Widgets, which come after the page, have sliders and pictures without names.
 
 What is left is seen by tests/browser/check_access.py.
 """
@@ -20,6 +22,21 @@ NAMES_AS_SEEN = """
 addEventListener("DOMContentLoaded", () => {
   for (const button of document.querySelectorAll(".search-button-field")) button.removeAttribute("aria-label");
   for (const picture of document.querySelectorAll(".theme-switch")) picture.removeAttribute("title");
+  for (const table of document.querySelectorAll(".bd-article table")) {
+    if (table.scrollWidth > table.clientWidth) table.tabIndex = 0;
+  }
+  if (!document.querySelector('script[type="application/vnd.jupyter.widget-view+json"]')) return;
+  const names = () => {
+    for (const handle of document.querySelectorAll(".noUi-handle:not([aria-label])")) {
+      const label = handle.closest(".jupyter-widgets")?.querySelector(".widget-label");
+      handle.setAttribute("aria-label", label?.textContent || "value");
+    }
+    for (const picture of document.querySelectorAll(".jp-RenderedImage > img:not([alt])")) {
+      picture.alt = "What the sliders above say, as a picture";
+    }
+  };
+  const often = setInterval(names, 500);
+  setTimeout(() => clearInterval(often), 60_000);
 });
 """
 

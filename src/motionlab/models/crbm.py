@@ -2,7 +2,7 @@
 
 Taylor, Hinton and Roweis (2006), *Modeling Human Motion Using Binary Latent Variables*, section 3; a
 rival of STRNN in its table of forecasts. Given the frames before it, u, a frame v and hidden units h
-have the energy
+have the energy ::
 
     E(v, h | u) = |v - a - A u|² / 2 - (b + B u) . h - v . W h ,
 

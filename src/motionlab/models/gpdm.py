@@ -2,7 +2,7 @@
 
 Wang, Fleet and Hertzmann (2005), *Gaussian Process Dynamical Models*; a rival of STRNN in its table of
 forecasts. Frames Y are a Gaussian process of points X of few dimensions, and each point is one of the
-point before it. With K_Y and K_X, the covariances by two kernels, D channels and d dimensions,
+point before it. With K_Y and K_X, the covariances by two kernels, D channels and d dimensions ::
 
     -log p(X, Y) = D/2 log|K_Y| + tr(Y' K_Y^-1 Y)/2 + d/2 log|K_X| + tr(X+' K_X^-1 X+)/2 + ...
 

@@ -28,7 +28,7 @@ _PAGE = """
 #{key} .turn {{ display: flex; flex-wrap: wrap; gap: .3em 1.5em; align-items: center; }}
 #{key} .turn label {{ display: inline-flex; align-items: center; gap: .5em; }}
 #{key} .turn output {{ min-width: 2.5em; font-variant-numeric: tabular-nums; }}
-#{key} figcaption {{ margin: .5rem 0; opacity: .85; font-size: .95em; }}
+#{key} figcaption {{ margin: .5rem 0; font-size: .95em; }}
 </style>
 <div class="chart">{chart}</div>
 <div class="turn">{inputs}</div>

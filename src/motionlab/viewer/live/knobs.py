@@ -32,7 +32,7 @@ _PAGE = """
 #{key} .ml-choose {{ display: none; }}
 #{key} .turn {{ display: flex; flex-wrap: wrap; gap: .3em 1.5em; align-items: center; }}
 #{key} .turn label {{ display: inline-flex; align-items: center; gap: .5em; }}
-#{key} figcaption {{ margin: .5rem 0; opacity: .75; font-size: .95em; }}
+#{key} figcaption {{ margin: .5rem 0; font-size: .95em; }}
 #{key} .turn output {{ min-width: 2.5em; font-variant-numeric: tabular-nums; }}
 </style>
 {player}
