@@ -83,6 +83,8 @@ class Clean(Written):
             said.append(f"{len(frames)} frames not believed ({some})")
         if record["way"] == "filter":
             said.append("the network does not know such motion, so it was only smoothed")
+        elif record["way"] == "map":
+            said.append("cleaned by the network, which knows such motion")
         if record["elsewhere as it was"]:
             said.append("the rest is calm: only these frames were changed")
         said.append(f"joints moved by up to {record['changed (cm)']:.1f} cm")

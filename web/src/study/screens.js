@@ -48,7 +48,7 @@ export function consent(host, { study, contact, rules, key }, place, begin, goOn
   const minutes = Math.ceil((items * (2 * study.seconds + 4)) / 60);
   host.append(
     heading("Before you begin"),
-    make("p", {}, `You will see ${items} ${study.design === "pairs" ? "pairs of short motions" : "short motions"} of a figure, and say of each how it looks to you. It takes about ${minutes} minutes. There is no right or wrong: what you see counts.`),
+    make("p", {}, `You will see ${items} ${study.design === "pairs" ? "pairs of short motions" : "short motions"} of a figure, and say of each how it looks to you. It takes about ${minutes} minute${minutes > 1 ? "s" : ""}. There is no right or wrong: what you see counts.`),
     make("p", {}, `Some motions were recorded from people, others were made by programs. You are not told which${key ? " before the end" : ""}.`),
     make("p", {}, "Your answers stay on this device. This page asks for no name, and sends nothing: at the end you save a file, and whether you hand it on is up to you. It holds your answers, their times, how often you played each motion, and a random number in place of a name. You can stop at any time."),
     kept(place),
