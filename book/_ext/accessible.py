@@ -5,7 +5,7 @@
 * References are a list whose entries are no list items: no list.
 * The search button is named "Search" and says "Search Ctrl+K"; the names of the colour button's
   pictures would do as well as its own.
-* A table that is wider than the page scrolls, but not by keys.
+* A table or a line of code that is wider than the page scrolls, but not by keys.
 * Widgets, which come after the page, have sliders and pictures without names.
 
 What is left is seen by tests/browser/check_access.py.
@@ -22,9 +22,15 @@ NAMES_AS_SEEN = """
 addEventListener("DOMContentLoaded", () => {
   for (const button of document.querySelectorAll(".search-button-field")) button.removeAttribute("aria-label");
   for (const picture of document.querySelectorAll(".theme-switch")) picture.removeAttribute("title");
-  for (const table of document.querySelectorAll(".bd-article table")) {
-    if (table.scrollWidth > table.clientWidth) table.tabIndex = 0;
-  }
+  const reach = () => {
+    for (const box of document.querySelectorAll(".bd-article :is(table, pre)")) {
+      if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
+    }
+  };
+  reach();
+  addEventListener("toggle", reach, true); // what was folded has no width before
+  addEventListener("click", () => setTimeout(reach));
+  addEventListener("resize", reach);
   if (!document.querySelector('script[type="application/vnd.jupyter.widget-view+json"]')) return;
   const names = () => {
     for (const handle of document.querySelectorAll(".noUi-handle:not([aria-label])")) {
