@@ -35,12 +35,11 @@ from ..common import record, rollouts, trainings
 from ..common.rollouts import OBSERVED
 from ..common.trainings import Run
 from . import samples
+from .pace_attempts import MORE, NATS, SHIPS, drawn
 
 MODEL = "lstm-gmm"
 FOLDER = Path("runs/replay_attempts")
 MINUTE = 1800  # frames
-MORE = {"updates": 400, "decay": 400, "learning_rate": 1e-3}  # of training, from what ships
-SHIPS = "as it ships"
 DRAWN: dict[str, dict] = {
     SHIPS: {},
     "half as much chance again": {"temperature": 1.5},
@@ -52,7 +51,7 @@ TRAINED = (
     trainings.Row("more noise", "inputs further off: 0.2 deviations", MORE | {"noise": 0.2}),
     trainings.Row("shorter windows", "windows of 32 frames", MORE | {"frames": 32, "batch": 64}),
 )
-REPLAYS, FAR, ACCELERATION, JERK, NATS = 0.05, 1.5, 0.10, 0.20, 1.0  # the rule's
+REPLAYS, FAR, ACCELERATION, JERK = 0.05, 1.5, 0.10, 0.20  # the rule's
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -92,11 +91,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run_of(row: trainings.Row) -> Run:
     preset = replace(PRESETS[MODEL]["ship"], **row.changes)
     return Run(row, 0, preset, FOLDER / row.name.replace(" ", "_"), find(MODEL))
-
-
-def drawn(model: nn.Module, factors: dict[str, float]) -> dict:
-    """How frames are drawn: as the model ships, some of it times a factor."""
-    return model.sampling | {name: by * model.sampling[name] for name, by in factors.items()}
 
 
 def measured(model: nn.Module, sampling: dict, full: Prepared, starts: int) -> dict:

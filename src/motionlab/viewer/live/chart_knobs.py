@@ -18,40 +18,26 @@ from typing import Any, NamedTuple
 from ...errors import ViewerError
 from ..pictures.palette import color
 from .figure import PageFigure
-from .knobs import MOST, check_knobs, page_input
+from .knobs import FOLLOWED, MOST, SETTINGS, STYLE, check_knobs, page_input
 from .knobs_kernel import knob_field
 
 WIDE, ROW, LEFT = 440, 34, 84  # of the chart, in its own units
-_PAGE = """
+_PAGE = (
+    """
 <figure class="motionlab-chart" id="{key}" style="margin:1rem 0">
 <style>
-#{key} .turn {{ display: flex; flex-wrap: wrap; gap: .3em 1.5em; align-items: center; }}
-#{key} .turn label {{ display: inline-flex; align-items: center; gap: .5em; }}
-#{key} .turn output {{ min-width: 2.5em; font-variant-numeric: tabular-nums; }}
-#{key} figcaption {{ margin: .5rem 0; font-size: .95em; }}
-</style>
-<div class="chart">{chart}</div>
-<div class="turn">{inputs}</div>
-<p><output class="said" aria-live="polite">{said}</output><br>
-<small>Computed beforehand: these settings, and no others.</small></p>
-{caption}
-<script>
-(() => {{
-  const box = document.getElementById("{key}");
-  const [names, made] = {made};
-  const inputs = [...box.querySelectorAll(".turn input")];
-  const draw = () => {{
-    const at = inputs.map((i) => i.type === "checkbox" ? Number(i.checked) : i.valueAsNumber);
-    [box.querySelector(".chart").innerHTML, box.querySelector(".said").textContent] = made[at.join()];
-    inputs.forEach((input, i) => {{
-      if (input.type === "range") input.nextElementSibling.textContent = names[i][at[i]];
-    }});
-  }};
-  inputs.forEach((input) => input.addEventListener("input", draw));
-}})();
-</script>
-</figure>
 """
+    + STYLE
+    + """</style>
+<div class="chart">{chart}</div>
+"""
+    + SETTINGS
+    + """    [box.querySelector(".chart").innerHTML, box.querySelector(".said").textContent] = made[at.join()];
+"""
+    + FOLLOWED
+    + """</figure>
+"""
+)
 
 
 class Bar(NamedTuple):

@@ -26,17 +26,13 @@ from .player import Track, page_html, payload
 from .show import still_picture, trail_points
 
 MOST = 60  # settings of a page
-_PAGE = """
-<div class="motionlab-knobs" id="{key}">
-<style>
-#{key} .ml-choose {{ display: none; }}
-#{key} .turn {{ display: flex; flex-wrap: wrap; gap: .3em 1.5em; align-items: center; }}
+# What pages under knobs share: how settings look, and the script around what each draws
+STYLE = """#{key} .turn {{ display: flex; flex-wrap: wrap; gap: .3em 1.5em; align-items: center; }}
 #{key} .turn label {{ display: inline-flex; align-items: center; gap: .5em; }}
-#{key} figcaption {{ margin: .5rem 0; font-size: .95em; }}
 #{key} .turn output {{ min-width: 2.5em; font-variant-numeric: tabular-nums; }}
-</style>
-{player}
-<div class="turn">{inputs}</div>
+#{key} figcaption {{ margin: .5rem 0; font-size: .95em; }}
+"""
+SETTINGS = """<div class="turn">{inputs}</div>
 <p><output class="said" aria-live="polite">{said}</output><br>
 <small>Computed beforehand: these settings, and no others.</small></p>
 {caption}
@@ -47,18 +43,34 @@ _PAGE = """
   const inputs = [...box.querySelectorAll(".turn input")];
   const draw = () => {{
     const at = inputs.map((i) => i.type === "checkbox" ? Number(i.checked) : i.valueAsNumber);
-    const [track, said] = made[at.join()];
-    box.querySelector(".motionlab-player").motionlab?.set("chosen", track);
-    box.querySelector(".said").textContent = said;
-    inputs.forEach((input, i) => {{
+"""
+FOLLOWED = """    inputs.forEach((input, i) => {{
       if (input.type === "range") input.nextElementSibling.textContent = names[i][at[i]];
     }});
   }};
   inputs.forEach((input) => input.addEventListener("input", draw));
 }})();
 </script>
-</div>
 """
+_PAGE = (
+    """
+<div class="motionlab-knobs" id="{key}">
+<style>
+#{key} .ml-choose {{ display: none; }}
+"""
+    + STYLE
+    + """</style>
+{player}
+"""
+    + SETTINGS
+    + """    const [track, said] = made[at.join()];
+    box.querySelector(".motionlab-player").motionlab?.set("chosen", track);
+    box.querySelector(".said").textContent = said;
+"""
+    + FOLLOWED
+    + """</div>
+"""
+)
 
 
 def knobs(
