@@ -108,17 +108,9 @@ def cost(model: Strnn, attempt: Attempt, windows: Tensor, chance: torch.Generato
     bends = said[..., model.glides].diff(n=2, dim=1)
     error = model._error(said, true) + model.smooth * bends.square().mean()
     if attempt.bones:
-        off = lengths(model, said) - lengths(model, true)
-        error = error + attempt.bones * (100 * off).square().mean()
+        off = 100 * model.encoding.bones_off(model.normalizer.inverse(said))
+        error = error + attempt.bones * off.square().mean()
     return error
-
-
-def lengths(model: Strnn, frames: Tensor) -> Tensor:
-    """Of bones (..., bones), in metres, of normalised frames."""
-    points = model.encoding._points(model.normalizer.inverse(frames))
-    parents = model.encoding.skeleton.parents
-    child = [joint for joint, parent in enumerate(parents) if parent >= 0]
-    return (points[..., child, :] - points[..., [parents[i] for i in child], :]).norm(dim=-1)
 
 
 @torch.no_grad()

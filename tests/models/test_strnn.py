@@ -131,6 +131,38 @@ def test_second_differences_cost_across_the_seam_but_not_in_contacts(clips):
     )
 
 
+def test_bones_of_wrong_lengths_cost_in_all_stages_but_not_at_run_time(clips):
+    encoding, features = clips
+    assert encoding.bones_off(features).abs().max() < 1e-6  # real frames have the skeleton's bones
+    model = made(clips, "temporal", residual=True)  # nothing is dropped, no batch norm
+    windows = features[:, :7]
+    for stage in (None, *(torch.full((6,), stage) for stage in (FIRST, BEHIND))):
+        model.bones = 0.0
+        plain = model.loss(windows, stage=stage)
+        seen = model.normalizer(windows)[:, :4]
+        said = model._whole(seen) if stage is None or stage[0] == BEHIND else model._said(seen)[0]
+        points = encoding.positions(model.normalizer.inverse(said))
+        skeleton, parents = encoding.skeleton, list(encoding.skeleton.parents[1:])
+        lengths = (points[:, :, 1:] - points[:, :, parents]).norm(dim=-1)
+        off = 100 * (lengths - skeleton.offsets[1:].norm(dim=-1))
+        model.bones = 0.2
+        torch.testing.assert_close(
+            model.loss(windows, stage=stage) - plain,
+            0.2 * off.square().mean(),
+            rtol=1e-4,
+            atol=1e-7,
+        )
+    plain = model.eval().loss(windows)
+    model.bones = 0.0
+    torch.testing.assert_close(model.loss(windows), plain)
+
+
+def test_the_cost_of_bones_is_kept_with_the_weights(clips):
+    model = made(clips, bones=0.1)
+    assert Strnn.from_config(model.config()).bones == 0.1
+    assert "bones" not in made(clips).config()  # as older weights are
+
+
 def test_the_penalty_is_of_weights_and_codes(clips):
     model, windows = made(clips, "temporal", penalty=0.1), clips[1][:, :7]
     _, codes = model._said(model.normalizer(windows)[:, :4])
@@ -293,7 +325,7 @@ def test_numbers_that_make_no_sense(clips):
     with pytest.raises(ModelError, match="reads 4"):
         model(features)
     for wrong in ({"width": 12}, {"width": 0}, {"encode": 0}, {"predict": 1.5}, {"drop": 1},
-                  {"smooth": -1}, {"penalty": float("inf")}):  # fmt: skip
+                  {"smooth": -1}, {"penalty": float("inf")}, {"bones": -1}):  # fmt: skip
         with pytest.raises(ModelError, match=next(iter(wrong))):
             made(clips, **wrong)
 

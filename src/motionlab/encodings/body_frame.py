@@ -117,6 +117,13 @@ class BodyFrame:
         features = check_features(self, features)
         return features[..., self.slices["contacts"]] if "contacts" in self.slices else None
 
+    def bones_off(self, features: Tensor) -> Tensor:
+        """Metres (..., frames, joints - 1) by which bones are longer than the skeleton's; to be learned
+        by, so nothing is checked. STRNN, equation 10, asks for it in control."""
+        points, parents = self._points(features), list(self.skeleton.parents[1:])
+        right = self.skeleton.offsets[1:].norm(dim=-1).to(features)
+        return (points[..., 1:, :] - points[..., parents, :]).norm(dim=-1) - right
+
     def _points(self, features: Tensor) -> Tensor:
         """Joints (..., frames, joints, 3) in the heading frame, the root first."""
         root = features[..., self.slices["root"]][..., :3]

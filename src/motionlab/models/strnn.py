@@ -65,6 +65,8 @@ class Strnn(nn.Module):
     smooth : w_s, what mean squared second differences cost in training, eq. 4 and 7; 0 is the paper's
         MSE.
     penalty : what mean squares of weights and codes cost in training.
+    bones : what squared errors of bone lengths cost in training, by cm²; not in the paper, which has it
+        in control alone (eq. 10).
 
     Raises
     ------
@@ -91,16 +93,18 @@ class Strnn(nn.Module):
         smooth: float = 0.0,
         penalty: float = 0.0,
         backward: bool = True,
+        bones: float = 0.0,
     ) -> None:
         super().__init__()
         check_normalizer(encoding, normalizer)
-        _check(width, encode, predict, drop, smooth, penalty)
+        _check(width, encode, predict, drop, smooth=smooth, penalty=penalty, bones=bones)
         if spatial not in (True, False, "dense"):
             raise ModelError(f'Strnn: spatial is {spatial!r}; it is True, False or "dense".')
         self.encoding, self.normalizer = encoding, normalizer
         self.width, self.encode, self.predict = width, encode, predict
         self.spatial, self.residual, self.conditional = spatial, residual, conditional
-        self.drop, self.smooth, self.penalty, self.backward = drop, smooth, penalty, backward
+        self.drop, self.smooth, self.penalty, self.bones = drop, smooth, penalty, bones
+        self.backward = backward
         self.kept = kept = len(normalizer.kept)
         size = kept
         if spatial:
@@ -146,7 +150,8 @@ class Strnn(nn.Module):
     ) -> Tensor:
         """Mean squared error of decoded frames and of predicted ones, added (eq. 5, 6), normalised.
 
-        In training mode `smooth` and `penalty` are added, except where the residual network learns.
+        In training mode `bones` is added, and, except where the residual network learns, `smooth` and
+        `penalty`.
 
         Parameters
         ----------
@@ -185,7 +190,11 @@ class Strnn(nn.Module):
 
     def _error(self, said: Tensor, true: Tensor) -> Tensor:
         off = (said - true).square()
-        return off[:, : self.encode].mean() + off[:, self.encode :].mean()
+        error = off[:, : self.encode].mean() + off[:, self.encode :].mean()
+        if self.training and self.bones:
+            off = 100 * self.encoding.bones_off(self.normalizer.inverse(said))
+            error = error + self.bones * off.square().mean()
+        return error
 
     def _said(
         self, seen: Tensor, true: Tensor | None = None, chance: torch.Generator | None = None,
@@ -362,7 +371,9 @@ class Strnn(nn.Module):
     def config(self) -> dict:
         """What `from_config` needs to build an untrained copy; fit for JSON."""
         kept = {name: getattr(self, name) for name in self.settings}
-        kept |= {} if self.backward else {"backward": False}  # older weights don't say
+        # older weights say neither
+        kept |= {} if self.backward else {"backward": False}
+        kept |= {"bones": self.bones} if self.bones else {}
         return {
             "encoding": self.encoding.config(), "kept": self.normalizer.kept.tolist(), **kept
         }  # fmt: skip
@@ -373,16 +384,16 @@ class Strnn(nn.Module):
         encoding = encodings.from_config(config["encoding"])
         normalizer = Normalizer(encoding.dim, len(config["kept"]))
         normalizer.kept.copy_(torch.tensor(config["kept"]))
-        names = (*cls.settings, *({"backward"} & config.keys()))
+        names = (*cls.settings, *({"backward", "bones"} & config.keys()))
         return cls(encoding, normalizer, **{name: config[name] for name in names})
 
 
-def _check(width, encode, predict, drop, smooth, penalty) -> None:
+def _check(width, encode, predict, drop, **costs) -> None:
     if not isinstance(width, Integral) or width < 8 or width % 8:
         raise ModelError(f"Strnn: width is {width!r}; it must be a multiple of 8.")
     check_counts("Strnn", encode=encode, predict=predict)
     if not 0 <= drop < 1:
         raise ModelError(f"Strnn: drop is {drop!r}; it must be a share, from 0 to below 1.")
-    for what, value in (("smooth", smooth), ("penalty", penalty)):
+    for what, value in costs.items():
         if not 0 <= value < math.inf:
             raise ModelError(f"Strnn: {what} is {value!r}; it must be a number from 0.")

@@ -69,6 +69,8 @@ class StrnnPreset(Preset):
     """w_s: what mean squared second differences cost. 0 is the paper's MSE, more its LH."""
     penalty: float = 0.0
     """What mean squares of weights and codes cost; 0.01 in the paper."""
+    bones: float = 0.0
+    """What squared errors of bone lengths cost, by cm²; not in the paper."""
     drop: float = 0.1
     """Share of units of the spatial network that are dropped."""
     quiet: int = 0
@@ -137,6 +139,7 @@ class StrnnPreset(Preset):
             data.encoding, data.normalizer, self.width, self.frames - self.predict, self.predict,
             spatial=self.spatial, residual=self.residual, conditional=self.conditional,
             drop=self.drop, smooth=self.smooth, penalty=self.penalty, backward=self.backward,
+            bones=self.bones,
         )  # fmt: skip
 
 
@@ -167,8 +170,8 @@ _STRNN = {
     ),
     "table": _TABLE,
     "ship": replace(
-        _TABLE, updates=28_000, decay=12_000, validate_every=1_000, width=192, quiet=30_000,
-        alone=2_000, behind=6_000,
+        _TABLE, updates=40_000, decay=16_000, validate_every=1_000, width=256, quiet=43_000,
+        alone=2_000, behind=6_000, bones=0.1,
     ),
     "paper": replace(
         _TABLE, updates=500_000, decay=0, width=512, validate_every=5_000, optimizer="adadelta",
@@ -179,8 +182,9 @@ _STRNN = {
 
 
 def _changed(**changes) -> dict[str, StrnnPreset]:
-    """The same presets for another row of the ablation, without stages."""
-    return {name: replace(preset, alone=0, behind=0, **changes) for name, preset in _STRNN.items()}
+    """The same presets for another row of the ablation, without stages and with the paper's costs."""
+    changes = {"alone": 0, "behind": 0, "bones": 0.0, **changes}
+    return {name: replace(preset, **changes) for name, preset in _STRNN.items()}
 
 
 _TEMPORAL = {"spatial": False, "residual": False}
