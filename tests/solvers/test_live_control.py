@@ -204,6 +204,47 @@ def test_behind_a_lock_frames_come_later_and_all_come(walker):
     assert len(one.behind.finish()[0].root_positions) == 5
 
 
+def test_the_way_that_is_done_is_told_within_half_a_turn_however_often_one_turned(walker):
+    one = live(walker, way="push")
+    one.going.velocity.zero_()
+    one.going.place[:, 2] = 5 * math.tau + 0.5  # who stands goes where he faces
+    assert one.record()["done"]["direction (°)"] == pytest.approx(math.degrees(0.5), abs=1e-3)
+
+
+def test_a_lock_may_end_and_begin_and_no_frame_is_lost(walker):
+    one, free = live(walker, way="push", lock=True), live(walker, way="push")
+    for _ in range(3):
+        one.go_on(), free.go_on()
+    (left,) = one.show(refined=True, lock=False)
+    assert left.frames == 5 and one.latency["lock"] == 0
+    assert one.motion().frames == free.motion().frames == 15
+    assert one.show(refined=True, lock=False) == [None]  # nothing changes
+    unlocked, there = one.go_on()[0], free.go_on()[0]
+    torch.testing.assert_close(unlocked.rotations, there.rotations)
+    torch.testing.assert_close(unlocked.root_positions, there.root_positions)
+    assert one.show(refined=True, lock=True) == [None] and one.go_on() == [None]
+    assert one.go_on()[0].frames == 5 and one.motion().frames == 25
+
+
+def test_a_refiner_that_is_not_shown_listens():
+    both = [
+        LiveControl(
+            "lstm-gmm-contacts", "walk", way="push", refiner=motionlab.load("refiner-contacts")
+        )
+        for _ in range(2)
+    ]
+    for one in both:
+        one.steer(1.2, 0.0)
+    both[0].show(refined=False, lock=False)
+    bare, refined = (one.go_on()[0] for one in both)
+    raw = both[0].model.encoding.to_motion(both[0].before.frame)
+    torch.testing.assert_close(bare.rotations[-1, 1:], raw.rotations[0, 1:], atol=1e-4, rtol=0)
+    assert (bare.rotations - refined.rotations).abs().max() > 1e-3
+    both[0].show(refined=True, lock=False)
+    bare, refined = (one.go_on()[0] for one in both)
+    torch.testing.assert_close(bare.rotations, refined.rotations, atol=1e-4, rtol=0)
+
+
 def test_a_refiner_in_the_stream_is_that_of_the_whole():
     model, refiner = motionlab.load("lstm-gmm-contacts"), motionlab.load("refiner-contacts")
     chance = torch.Generator().manual_seed(0)

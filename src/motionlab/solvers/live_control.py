@@ -218,6 +218,16 @@ class LiveControl:
         self.times.append(time.perf_counter() - begin)
         return made
 
+    def show(self, refined: bool, lock: bool) -> list[Motion | None]:
+        """From the next frames on they are refined or not, as far as there is a refiner, and feet are held
+        or not. The frames of each character that a lock kept back, if it ends; else None."""
+        self.behind.refines = refined
+        left = self.behind.hold(lock)
+        for kept, motion in zip(self.kept, left, strict=True):
+            if motion is not None:
+                kept.append(motion)
+        return left
+
     def _begin_again(self, found: Window) -> None:
         """Who came apart goes on from where he was, as he began: a jump, but no end."""
         far = self.model.normalizer(found.frames).abs().flatten(1).amax(1)
@@ -263,7 +273,7 @@ class LiveControl:
         speed, way, off = float(self.aim.speed[row]), float(self.aim.direction[row]), 0.0
         only = self.aim[torch.tensor([row])]
         off = math.degrees(only.wanted(self.going[torch.tensor([row])])[2].item())
-        going = math.degrees(float(self.going.bearing()[row]))
+        going = math.degrees(wrapped(float(self.going.bearing()[row])))
         led = int(self.aim.which[row]) >= 0 or bool(self.aim.target[row].isfinite().all())
         since = (self.frames - int(self.asked_at[row])) / self.fps
         times = torch.tensor(list(self.times) or [math.nan], dtype=torch.double)

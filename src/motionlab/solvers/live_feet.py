@@ -25,7 +25,8 @@ class Behind:
     ----------
     encoding : of the features; fps : of them.
     frame : (batch, dim), raw units, the frame before the first, which stands at place (batch, 3).
-    refiner : corrects them, or None. Its root stays within its reach of the one it is given.
+    refiner : corrects them, or None. Its root stays within its reach of the one it is given. While
+        `refines` is False it only listens.
     lock : hold toes still while they are in contact; gives frames `late` frames behind.
     """
 
@@ -37,20 +38,23 @@ class Behind:
         refiner: Refiner | None = None,
         lock: bool = False,
     ) -> None:
-        self.encoding, self.refiner = encoding, refiner
+        self.encoding, self.refiner, self.refines = encoding, refiner, True
         self.state, self.place = None, place.double()
         self.known = broken.knows(encoding)
         self.before = frame if refiner is None else self._refined(frame[:, None])[:, 0]
-        streams = range(len(frame)) if lock else ()
-        self.locks = [LockStream(encoding.skeleton, encoding.fps) for _ in streams]
-        self.waiting = [torch.zeros(0, 4, dtype=torch.bool) for _ in streams]
-        self.late = self.locks[0].ahead if lock else 0
+        self._begin_locks(len(frame) if lock else 0)
+
+    def _begin_locks(self, count: int) -> None:
+        self.locks = [LockStream(self.encoding.skeleton, self.encoding.fps) for _ in range(count)]
+        self.waiting = [torch.zeros(0, 4, dtype=torch.bool) for _ in range(count)]
+        self.late = self.locks[0].ahead if count else 0
 
     @torch.no_grad()
     def go_on(self, frames: Tensor) -> list[Motion]:
         """Of each character, what is done: frames (batch, n, dim) in raw units, or those before them."""
         encoding = self.encoding
-        frames = frames if self.refiner is None else self._refined(frames)
+        refined = frames if self.refiner is None else self._refined(frames)
+        frames = refined if self.refines else frames
         rows = torch.cat([self.before[:, None], frames], 1)
         with np.errstate(all="ignore"):  # as torch: who leaves all bounds is told by the numbers
             roots, rotations = rotations_of(encoding, rows, self.place)
@@ -67,6 +71,14 @@ class Behind:
     def finish(self) -> list[Motion | None]:
         """The frames that wait for what comes next, at the end; None where there are none."""
         return [self._done(i, *lock.finish()) for i, lock in enumerate(self.locks)]
+
+    def hold(self, lock: bool) -> list[Motion | None]:
+        """From the next frames on feet are held, or no longer; the frames that waited, as of `finish`."""
+        if lock == bool(self.locks):
+            return [None] * len(self.before)
+        left = self.finish() if self.locks else [None] * len(self.before)
+        self._begin_locks(len(self.before) if lock else 0)
+        return left
 
     def _refined(self, frames: Tensor) -> Tensor:
         found = []

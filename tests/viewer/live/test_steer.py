@@ -172,6 +172,32 @@ def test_beginning_again_gives_the_same_and_a_lock_waits(asked):
     assert made.live[0].behind.late > 0
 
 
+def test_feet_are_locked_or_let_go_while_he_walks_and_all_that_was_done_stays(asked):
+    made, ask = asked
+    assert made.content["restarts"] == ["start", "seed"]
+    told = [ask("begin"), ask(lock=0), ask(lock=0, refined=0), ask(refined=0), ask()]
+    counts = [len(each["characters"][0]["rows"]) for each in told]
+    assert counts == [5, 10, 5, 5, 5] and made.motion().frames == 30
+    assert [each["characters"][0]["late"] for each in told] == [5, 0, 0, 5, 5]
+    places = np.concatenate([np.array(each["characters"][0]["places"]) for each in told])
+    assert np.linalg.norm(np.diff(places[:, :2], axis=0), axis=1).max() < 0.1  # nobody jumps
+
+
+def test_what_a_cell_asks_counts_until_the_page_asks_for_something_else(asked):
+    made, ask = asked
+    stand, walk = {"speed": 0.0, "direction": 0.0}, {"speed": 1.0, "direction": 0.0}
+    ask("begin", wish=stand)
+    made.live[0].steer(1.2, target=[2.0, 0.0])
+    told = [ask(wish=stand) for _ in range(4)]
+    assert made.live[0].aim.target[0].tolist() == [2.0, 0.0]
+    said = told[-1]["characters"][0]["asked"]  # the arrow points to the place
+    assert said["speed"] > 0.2 and said["direction"] == pytest.approx(math.pi / 2, abs=0.5)
+    ask(wish=walk)
+    assert made.live[0].aim.target.isnan().all() and float(made.live[0].aim.speed[0]) == 1.0
+    ask("begin", wish=stand)  # heard again by who begins again
+    assert float(made.live[0].aim.speed[0]) == 0.0
+
+
 def test_who_is_far_from_a_line_goes_to_its_beginning_and_then_along_it(asked):
     made, ask = asked
     ask("begin", lock=0)

@@ -20,7 +20,7 @@ from torch import nn
 from ...errors import MotionLabError, ViewerError
 from ...kinematics import heading
 from ...metrics import broken
-from ...motion import Motion
+from ...motion import Motion, concatenate
 from ...paths import Path
 from .dream_settings import Control, name_of, sampled_tracks
 from .network_figure import live_of
@@ -69,11 +69,13 @@ class SteerWidget(anywidget.AnyWidget):
         self._made = model, control, refiner, tuple(beside)
         self._live: list[Any] = []
         self._lines: list[Any] = []  # that each of them goes along, if one
+        self._wishes: list[Any] = []  # of the page, that each of them heard last
         self.on_msg(lambda _widget, message, _buffers: self._asked(message))
 
     @property
     def live(self) -> list[Any]:
-        """The controls of the characters, to look into or to ask by hand."""
+        """The controls of the characters, to look into or to ask by hand, as for a `target`: that counts
+        until keys, a stick or a slider of the page ask for something else."""
         return self._live
 
     def motion(self, who: int = 0) -> Motion:
@@ -101,12 +103,11 @@ class SteerWidget(anywidget.AnyWidget):
         self._live = [
             control(
                 model, int(settings["start"]), futures=futures, seed=int(settings["seed"]),
-                refiner=refiner if settings.get("refined", 1) else None,
-                lock=bool(settings.get("lock")), places=[[-1.5 * k, 0.0, 0.0]],
+                refiner=refiner, lock=bool(settings.get("lock")), places=[[-1.5 * k, 0.0, 0.0]],
             )
             for k, futures in enumerate(several)
         ]  # fmt: skip
-        self._lines = [None] * len(several)
+        self._lines, self._wishes = [None] * len(several), [None] * len(several)
 
     def _window(self, message: dict[str, Any]) -> list[dict[str, Any]]:
         """The next frames of each of them."""
@@ -116,17 +117,21 @@ class SteerWidget(anywidget.AnyWidget):
             live.how = self._how(live, settings, k)
             if wish:
                 self._wish(live, wish, k)
+            (left,) = live.show(bool(settings.get("refined", 1)), bool(settings.get("lock")))
             motion = None
             while motion is None:  # a lock gives nothing at first
                 (motion,) = live.go_on()
-            made.append(_shown(live, motion))
+            made.append(_shown(live, concatenate([left, motion]) if left else motion))
         return made
 
     def _wish(self, live: Any, wish: dict[str, Any], k: int) -> None:
         """What is asked of a character: a way, or a line, to whose beginning he goes first."""
-        line = wish.get("line")
-        if line is None:
+        line, heard = wish.get("line"), self._wishes[k]
+        self._wishes[k] = wish
+        if line is None and wish != heard:
             live.steer(wish.get("speed"), wish.get("direction"))
+        elif line is None:  # what a cell asked meanwhile stays
+            return
         elif line == self._lines[k]:  # who goes along it goes on
             live.steer(wish.get("speed"))
         else:
@@ -181,9 +186,9 @@ def _shown(live: Any, motion: Motion) -> dict[str, Any]:
 
 
 def _asked(live: Any) -> dict[str, float]:
-    """Speed and way that are asked now; of who goes along a line, where it leads from here."""
+    """Speed and way that are asked now; of who goes along a line or to a place, where that leads from here."""
     aim, going = live.aim, live.going
-    if int(aim.which[0]) < 0:
+    if int(aim.which[0]) < 0 and not aim.target[0].isfinite().all():
         return {"speed": float(aim.speed[0]), "direction": float(aim.direction[0])}
     speed, _, off = aim.wanted(going)
     way = float(going.bearing()[0]) + float(off[0])
@@ -223,5 +228,5 @@ def widget(
         "facts": [],
     }
     content = {"networks": [network], "beside": cast_of(beside, look.color), "height": look.height,
-               "kept": KEPT, "restarts": ["start", "seed", "refined", "lock"]}  # fmt: skip
+               "kept": KEPT, "restarts": ["start", "seed"]}  # fmt: skip
     return SteerWidget(model, control, refiner, beside, content=content, caption=caption or "")
