@@ -123,6 +123,14 @@ def test_who_comes_apart_begins_again(visit):
     page.locator("p[role=status]").filter(has_text="began again").wait_for(timeout=PATIENCE)
 
 
+AFTER_A_WISH = """(frames => {
+  const { steered } = document.querySelector("figure").motionlab;
+  steered.steer({ speed: 3, direction: 3 });
+  steered.reach(steered.last + frames);
+  return steered.records[0].notes;
+})"""
+
+
 def test_without_help_nothing_is_asked(visit):
     page = visit().page
     load(page)
@@ -137,8 +145,17 @@ def test_without_help_nothing_is_asked(visit):
     }"""
     free = page.evaluate(run, 0)
     assert page.evaluate(run, 1.5) == free
+    told = """() => {
+      const figure = document.querySelector("figure").motionlab;
+      figure.player.clock.seek(60);
+      figure.tell();
+      return figure.lines[0].asked.textContent;
+    }"""
+    assert page.evaluate(told) == "asked: nothing"
+    assert page.evaluate(f"{AFTER_A_WISH}(90)") == []  # what is not asked can't be missed
     page.get_by_label("Help", exact=True).check()
     assert page.evaluate(run, 1.5) != page.evaluate(run, 0)
+    assert page.evaluate(told) == "asked: 1.2 m/s, 0°"
 
 
 def test_sliders_act_and_the_direction_is_held_without_keys(visit):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from steered_pages import SECOND, frames_pass, load, settled, until, value, write_pages
+from steered_pages import PATIENCE, SECOND, frames_pass, load, settled, until, value, write_pages
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -37,6 +37,44 @@ def test_keys_turn_him_about(visit):
     assert value(page, z) < before - 0.5  # a second's walk back to where one looks from
     page.keyboard.up("KeyS")
     until(page, "figure.steered.characters[0].before.going.pace < 0.15")  # he stands
+
+
+def test_until_a_hand_steers_it_is_told_how(visit):
+    page = visit().page
+    load(page)
+    said = page.locator("p[role=status]")
+    said.filter(has_text="Hold an arrow key").wait_for(timeout=PATIENCE)
+    page.keyboard.down("ArrowUp")
+    said.filter(has_text="Runs here").wait_for(timeout=PATIENCE)
+    page.keyboard.up("ArrowUp")
+    assert value(page, "commands.used") is True
+
+
+def test_pictures_that_come_late_are_told(visit):
+    page = visit().page
+    load(page)
+    page.get_by_role("button", name="Pause").click()
+    told = page.evaluate(
+        """() => {
+          const figure = document.querySelector("figure").motionlab;
+          const pace = figure.player.passes;
+          figure.commands.used = true;
+          figure.steered.cost = 1; // making them is fast
+          return [0.125, 0.25, 1].map((share) => {
+            pace.take();
+            pace.rest();
+            for (let i = 0; i <= 10; i++) pace.picture(500 * i, 0.5 * share);
+            pace.picture(60_000, 0.25); // back after a minute elsewhere
+            pace.rest();
+            pace.picture(90_000, 0); // and after a pause
+            figure.tellCost();
+            return figure.status.textContent;
+          });
+        }"""
+    )
+    assert "time passes at 0.1 of its pace" in told[0]
+    assert "time passes at 0.3 of its pace" in told[1]
+    assert "late" not in told[2]
 
 
 def test_shift_runs(visit):

@@ -16,6 +16,7 @@ export class Commands {
   constructor(settings, turned) {
     Object.assign(this, { settings, turned, keys: new Set(), stick: [0, 0], pad: [0, 0], running: false, padRuns: false });
     this.path = null; // a Path to go along, until a hand does something
+    this.used = false; // something was asked, so nobody need be told how
   }
 
   /** Nothing is pressed any more: the page has lost the focus, or nobody looks. */
@@ -37,6 +38,7 @@ export class Commands {
     const [left, ahead] = this.hand;
     const far = Math.min(Math.hypot(left, ahead), 1);
     if (far) this.path = null;
+    this.used ||= Boolean(far || this.path || settings.onward);
     if (this.path) return { speed: settings.speed, path: this.path };
     if (!far) return { speed: settings.onward ? settings.speed : 0, direction: radians(settings.direction) };
     const direction = view + Math.atan2(left, ahead);

@@ -16,6 +16,8 @@ const OF_HANDS = ["speed", "direction", "onward"]; // settings of what is asked;
 const NEAR = [...OF_HANDS, "help", "lock", "refined"]; // those that stand right below the picture, where a thumb is
 const ROOMY = "(min-width: 481px)"; // a window in which all of them do
 
+const BEGIN = "Hold an arrow key, or W, A, S or D, to walk that way, with Shift to run. Or drag the stick in the picture.";
+
 const make = (tag, className, text = "") => Object.assign(document.createElement(tag), { className, textContent: text });
 const degrees = (angle) => Math.round((180 * Math.atan2(Math.sin(angle), Math.cos(angle))) / Math.PI); // within half a turn
 
@@ -163,18 +165,20 @@ export class SteerFigure {
     this.steered.tracks.forEach((track, k) => {
       const seen = track.at(this.player.frame);
       const { asked: { speed, direction }, pace, bearing } = seen;
-      this.lines[k].asked.textContent = speed < 0.15 ? "asked: stand" : `asked: ${speed.toFixed(1)} m/s, ${degrees(direction)}°`;
+      this.lines[k].asked.textContent = Number.isNaN(direction) ? "asked: nothing" : speed < 0.15 ? "asked: stand" : `asked: ${speed.toFixed(1)} m/s, ${degrees(direction)}°`;
       this.lines[k].done.textContent = pace < 0.15 ? `does: ${pace.toFixed(2)} m/s` : `does: ${pace.toFixed(1)} m/s, ${degrees(bearing)}°`;
       if (seen.next) this.bars[k]?.show(seen);
     });
     this.course.mark(this.steered.tracks.map((track) => [track.color, track.onGround(this.player.frame)]), this.player.frame);
   }
 
-  /** What a frame costs, and what is not met. */
+  /** How to begin; then what a frame costs, whether pictures come too slowly, and what is not met. */
   tellCost() {
+    const pace = this.player.passes.take();
     const [first] = this.steered.records;
     const notes = first?.notes.length ? ` Not met: ${first.notes.join("; ")}.` : "";
-    this.say(`${this.source.cost(this.steered)}${notes}`);
+    const begun = this.commands.used || notes || this.source.failed;
+    this.say(begun ? `${this.source.cost(this.steered, pace)}${notes}` : BEGIN);
   }
 
   say(text) {

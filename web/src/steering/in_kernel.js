@@ -2,6 +2,7 @@
 // about to need one and says with it what is wished, so that nothing runs ahead and nobody has to be stopped.
 import { JointAngles } from "../network/joint_angles.js";
 import { LiveTrack } from "../network/live_track.js";
+import { late } from "./pace.js";
 import { KEPT } from "./steered.js";
 
 const AHEAD = 6; // frames: a window is asked for so long before it is due
@@ -105,11 +106,12 @@ export class KernelSource {
     this.resolve(this.steered);
   }
 
-  cost({ cost, fps, latency }) {
+  /** `pace` as of a PageSource. */
+  cost({ cost, fps, latency }, pace) {
     if (this.failed) return this.failed;
     const [least, most] = latency.map((seconds) => seconds.toFixed(2));
     const made = Math.round(1000 / Math.max(cost, 1e-3));
-    const slow = made < fps ? " Time passes slower." : "";
+    const slow = made < fps ? " Time passes slower." : late(pace);
     return `The kernel makes ${made} frames a second; ${fps} are needed. A wish is seen after ${least} to ${most} s.${slow}`;
   }
 

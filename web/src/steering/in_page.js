@@ -2,6 +2,7 @@
 import { pickStart } from "../network/guided.js";
 import { SHARE } from "../network/live_player.js";
 import { loadWeights, readWeights } from "../network/weights.js";
+import { late } from "./pace.js";
 import { Steered } from "./steered.js";
 
 const PACE = 1.2; // m/s, of a start that nobody chose
@@ -21,8 +22,10 @@ export class PageSource {
     return new Steered(weights, live.look, body, settings, cast);
   }
 
-  cost({ cost, fps, cast, latency }) {
-    const slow = cost > (SHARE * 1000) / fps ? " That is too much for this machine, and time passes slower" + (cast[0].futures ? "." : ": take fewer futures.") : "";
+  /** `pace`: of time as it is seen, 1 where pictures come in time. */
+  cost({ cost, fps, cast, latency }, pace) {
+    const much = cost > (SHARE * 1000) / fps;
+    const slow = much ? " That is too much for this machine, and time passes slower" + (cast[0].futures ? "." : ": take fewer futures.") : late(pace);
     const [least, most] = latency.map((seconds) => seconds.toFixed(2));
     return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame. A wish is seen after ${least} to ${most} s.${slow}`;
   }

@@ -64,6 +64,6 @@ export class Inside {
     });
     const finite = energies.filter(Number.isFinite);
     this.futures.textContent = energies.length < 2 ? "One future: nothing is chosen."
-      : `${energies.length} futures: the best is ${energies[chosen].toFixed(1)} nats from what is asked, the worst ${Math.max(...finite).toFixed(1)}.`;
+      : `${energies.length} futures: the one that is kept has an energy of ${energies[chosen].toFixed(1)} nats, the worst of ${Math.max(...finite).toFixed(1)}.`;
   }
 }

@@ -11,6 +11,7 @@ const STRANGE = 20; // deviations of the data from their mean: no body is there
 const HASTE = 3; // deviations above the data's mean step: nobody is faster
 const DUE = 2; // seconds after a wish; what is not met by then is said
 const [SLOWER, ASTRAY] = [0.15, 20]; // share of the speed, and degrees: what is said
+const NOTHING = { speed: 0, direction: NaN }; // is asked of who is not helped
 const degrees = (angle) => (180 * angle) / Math.PI;
 
 /** Speed (m/s) that no motion of the data goes far beyond. */
@@ -23,7 +24,7 @@ export class LiveControl {
    * `start` of weights.js; `place` {x, z, yaw}; `seed` of all chance.
    */
   constructor(parts, start, place, seed) {
-    Object.assign(this, { parts, start, random: new Random(seed), frames: 0, askedAt: 0, lost: 0, tooFast: 0 });
+    Object.assign(this, { parts, start, random: new Random(seed), frames: 0, askedAt: 0, asking: true, lost: 0, tooFast: 0 });
     this.before = this.begin(place);
     this.aim = Aim.none(this.before.going);
     this.gliding = new Gliding(parts);
@@ -70,8 +71,10 @@ export class LiveControl {
   take(refined) {
     const best = this.window.best();
     const { speed, way } = this.window.aim.way(this.before.going, 0);
-    const asked = { speed, direction: way };
-    if (this.window.settings.push > 0) this.gliding.remind(best, this.before.row);
+    const { push, futures } = this.window.settings;
+    this.asking = push > 0 || futures > 1;
+    const asked = this.asking ? { speed, direction: way } : NOTHING;
+    if (push > 0) this.gliding.remind(best, this.before.row);
     this.window = null;
     if (this.apart(best)) this.again(best);
     this.before = { ...best, row: best.rows.at(-1) };
@@ -113,8 +116,8 @@ export class LiveControl {
     const off = degrees(aim.wanted(going).off);
     const since = (this.frames - this.askedAt) / fps;
     const notes = [];
-    if (this.tooFast) notes.push(`${this.tooFast.toFixed(1)} m/s is faster than anybody in the data; ${fastest.toFixed(1)} m/s was asked for`);
-    if (since >= DUE) {
+    if (this.asking && this.tooFast) notes.push(`${this.tooFast.toFixed(1)} m/s is faster than anybody in the data; ${fastest.toFixed(1)} m/s was asked for`);
+    if (this.asking && since >= DUE) {
       const still = aim.speed < STILL;
       if (Math.abs(off) > ASTRAY && !still) notes.push(`${Math.abs(off).toFixed(0)}° off the way that was asked`);
       if (!aim.path && still && going.pace > 0.1) notes.push(`does not stand yet: ${going.pace.toFixed(2)} m/s`);

@@ -5,6 +5,7 @@ import { TWIST } from "../player.js";
 import { Arrows } from "./arrows.js";
 import { steers } from "./commands.js";
 import { giveBack, takes } from "./focus.js";
+import { Pace } from "./pace.js";
 import { Stick } from "./stick.js";
 
 const BEHIND = Math.PI; // the camera's azimuth: one looks along z, as he does
@@ -14,7 +15,7 @@ export class SteerPlayer extends LivePlayer {
   /** `payload`: height, floor, trail, autoplay, kept (seconds); `steered`: Steered, or what a kernel steers. */
   constructor(host, payload, still, steered, commands) {
     super(host, payload, still, steered);
-    Object.assign(this, { steered, commands });
+    Object.assign(this, { steered, commands, passes: new Pace() });
     this.canvas.setAttribute("role", "application");
     this.canvas.setAttribute("aria-roledescription", "steered character");
     this.canvas.setAttribute("aria-label", "A character who is steered: hold arrow keys, or W, A, S and D, to go that way as you see it, with "
@@ -90,9 +91,13 @@ export class SteerPlayer extends LivePlayer {
   // -- time ---------------------------------------------------------------------------------------
 
   tick(seconds) {
+    const now = performance.now();
+    const before = this.clock.time;
     this.commands.poll();
     this.steered.steer(this.commands.asked(this.facing));
     super.tick(seconds);
+    if (this.playing) this.passes.picture(now, (this.clock.time - before) / (this.clock.fps * this.clock.speed));
+    else this.passes.rest();
   }
 
   /** Radians off +z that the camera looks. */
