@@ -78,6 +78,22 @@ def test_feet_that_are_held_after_it_leave_knees_as_they_are(here):
     assert (held.root_positions - calm.root_positions)[:, 1].min() > -0.015
 
 
+def test_a_true_walk_is_left_as_it_is_within_millimetres(here):
+    """Toes rise and sink a little as feet roll: no reason for the body to come down, nor for knees to pop."""
+    bobs = 0.012 * torch.sin(5 * torch.pi * torch.arange(len(WALK)) / WALK.fps)
+    slides = 0.006 * torch.sin(3 * torch.pi * torch.arange(len(WALK)) / WALK.fps)
+    moves = torch.stack([slides, bobs, slides], 1)
+    truth = replace(WALK, root_positions=WALK.root_positions + moves, contacts=None)
+    write_bvh(truth, "true.bvh")
+    assert main(["clean", "true.bvh", "--out", "x.bvh"]) == 0
+    truth, found = read_bvh("true.bvh"), read_bvh("x.bvh")
+    assert (found.root_positions - truth.root_positions).abs().max() < 0.007
+    assert (found.positions() - truth.positions()).norm(dim=-1).mean() < 0.006
+    assert (knees(found) - knees(truth)).abs().mean() < 3
+    steps = lambda its: knees(its).diff(dim=0).abs().max()
+    assert steps(found) < 1.05 * steps(truth)
+
+
 @pytest.mark.parametrize("wild", [[], WILD])
 def test_curves_are_scaled_by_frames_that_were_believed(wild, tmp_path):
     """A frame that is 72 cm off would press a tremble of a centimetre flat; the table leaves it out."""
