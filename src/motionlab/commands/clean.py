@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+import torch
 from tyro.conf import arg
 
 from ..errors import MotionLabError
@@ -89,8 +90,18 @@ class Clean(Written):
             said.append("cleaned by the network, which knows such motion")
         if record["elsewhere as it was"]:
             said.append("the rest is calm: only these frames were changed")
-        said.append(f"joints moved by up to {record['changed (cm)']:.1f} cm")
+        said.append(_moved(motion, found, frames))
         return found, said, frames
+
+
+def _moved(before: Motion, after: Motion, wild: list[int]) -> str:
+    """How far joints were moved, in words; apart in frames that were not believed."""
+    far = 100 * (after.positions() - before.positions()).norm(dim=-1).amax(1)
+    others = torch.ones(len(far), dtype=torch.bool)
+    others[wild] = False
+    most = f"joints moved by up to {far[others].max():.1f} cm" if others.any() else ""
+    there = f"those of frames not believed by {far[wild].max():.1f} cm" if wild else ""
+    return ", ".join(filter(None, (most, there)))
 
 
 def _levels(text: str) -> tuple[float, float]:
