@@ -45,6 +45,10 @@ def test_frames_that_jump_are_told_and_alone_changed(here, capsys):
     )
     said = capsys.readouterr().out
     assert "2 frames not believed (20, 41)" in said and "only these frames were changed" in said
+    near, far = map(
+        float, re.search(r"by up to ([\d.]+) cm, those .* by ([\d.]+) cm", said).groups()
+    )
+    assert near < 1 and 60 < far < 90
     moved = (read_bvh("x.bvh").positions() - WALK.positions()).norm(dim=-1).amax(1)
     assert moved.max() < 0.05
     moved[WILD] = 0
@@ -59,6 +63,16 @@ def test_three_frames_are_refused_in_words(here, capsys):
     said = capsys.readouterr().err
     assert "Clip 'short' has 3 frames, too few to tell noise from motion; 8 are needed" in said
     assert "Motion(" not in said
+
+
+@pytest.mark.parametrize(("units", "hint"), [("m", "--units=mm"), ("mm", "--units=m.")])
+def test_a_body_of_no_ones_size_is_told_of_a_unit_that_mends_it(units, hint, here, capsys):
+    write_bvh(WALK, "walk.bvh")
+    assert (
+        main(["clean", "walk.bvh", "--denoise", "auto", f"--units={units}", "--out", "x.bvh"]) == 1
+    )
+    said = capsys.readouterr().err
+    assert hint in said and "read_bvh" not in said and "frame/s" not in said
 
 
 def test_feet_that_are_held_after_it_leave_knees_as_they_are(here):
@@ -78,13 +92,29 @@ def test_feet_that_are_held_after_it_leave_knees_as_they_are(here):
     assert (held.root_positions - calm.root_positions)[:, 1].min() > -0.015
 
 
+def test_a_true_walk_is_left_as_it_is_within_millimetres(here):
+    """Toes rise and sink a little as feet roll: no reason for the body to come down, nor for knees to pop."""
+    bobs = 0.012 * torch.sin(5 * torch.pi * torch.arange(len(WALK)) / WALK.fps)
+    slides = 0.006 * torch.sin(3 * torch.pi * torch.arange(len(WALK)) / WALK.fps)
+    moves = torch.stack([slides, bobs, slides], 1)
+    truth = replace(WALK, root_positions=WALK.root_positions + moves, contacts=None)
+    write_bvh(truth, "true.bvh")
+    assert main(["clean", "true.bvh", "--out", "x.bvh"]) == 0
+    truth, found = read_bvh("true.bvh"), read_bvh("x.bvh")
+    assert (found.root_positions - truth.root_positions).abs().max() < 0.007
+    assert (found.positions() - truth.positions()).norm(dim=-1).mean() < 0.006
+    assert (knees(found) - knees(truth)).abs().mean() < 3
+    steps = lambda its: knees(its).diff(dim=0).abs().max()
+    assert steps(found) < 1.05 * steps(truth)
+
+
 @pytest.mark.parametrize("wild", [[], WILD])
 def test_curves_are_scaled_by_frames_that_were_believed(wild, tmp_path):
     """A frame that is 72 cm off would press a tremble of a centimetre flat; the table leaves it out."""
     seen = corrupt.tremble(WALK, 0.01, 0.0, generator=torch.Generator().manual_seed(0))
     write_report(with_wild(seen), WALK, ["said"], tmp_path / "x.html", wild)
     page = (tmp_path / "x.html").read_text()
-    highest = float(re.search(r'<text x="0" y="16">(\d+) cm', page)[1])
+    highest = float(re.search(r'<span class="high">(\d+) cm', page)[1])
     most = [
         float(row) for row in re.findall(r"<tr><td>[^<]+</td><td>[\d.]+</td><td>([\d.]+)", page)
     ]

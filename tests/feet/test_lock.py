@@ -18,7 +18,7 @@ from motionlab.errors import ModelError
 from motionlab.feet.contacts import foot_points
 from motionlab.feet.legs import PARTS, leg_joints
 from motionlab.feet.lock import STRAIGHT, lock
-from motionlab.feet.marks import clean
+from motionlab.feet.marks import clean, longest
 from motionlab.metrics import foot_skate
 from motionlab.roles import SIDES
 from motionlab.solvers import lock_feet
@@ -96,6 +96,35 @@ def test_a_body_that_rises_is_not_pulled_down_by_feet_that_are_said_to_stand():
     assert free > 0.1 and kept < 0.07  # some for easing in and out, and for a smooth way
     with pytest.raises(ModelError, match="deepest"):
         lock_feet(risen, down, deepest=float("nan"))
+
+
+def test_feet_that_keep_their_heights_are_held_without_the_body_coming_down():
+    """A foot rolls, and its toes rise by a centimetre while they rest; a leg reaches no farther down."""
+    motion, down = sliding(slide=0.1)
+    bobs = 0.012 * torch.sin(5 * torch.pi * torch.arange(len(motion)) / motion.fps)
+    root = motion.root_positions + bobs[:, None] * torch.tensor([0.0, 1.0, 0.0])
+    motion = replace(motion, root_positions=root)
+    locked = lock_feet(motion, down, level=False)
+    held = clean(down, motion.fps)
+    along = toes_of(locked).diff(dim=0)[..., [0, 2]].norm(dim=-1)
+    assert along[held[1:] & held[:-1]].max() < 1e-4
+    assert torch.allclose(toes_of(locked)[..., 1], toes_of(motion)[..., 1], atol=1e-4)
+    sunk, sunk_to_floor = (
+        float((root - its.root_positions)[:, 1].max())
+        for its in (locked, lock_feet(motion, down, floor=None))
+    )
+    assert sunk < 0.5 * sunk_to_floor
+
+
+def test_a_foot_that_was_let_go_is_not_taken_up_again_in_the_same_contact():
+    held = torch.tensor([1, 1, 1, 1, 1, 1, 0, 1, 1, 1], dtype=torch.bool)
+    marks = torch.tensor([1, 0, 1, 1, 0, 1, 0, 0, 1, 0], dtype=torch.bool)
+    kept = torch.tensor([0, 0, 1, 1, 0, 0, 0, 0, 1, 0], dtype=torch.bool)
+    none, equal = torch.zeros(10, dtype=torch.bool), marks & (torch.arange(10) != 3)
+    first = torch.tensor([1, 0, 0, 0, 0, 0, 0, 0, 1, 0], dtype=torch.bool)
+    found = longest(torch.stack([marks, none], 1), torch.stack([held, held], 1))
+    assert torch.equal(found, torch.stack([kept, none], 1))
+    assert torch.equal(longest(equal[:, None], held[:, None])[:, 0], first)
 
 
 def test_feet_keep_the_way_they_point_and_bones_their_length():

@@ -11,9 +11,11 @@ from motionlab import corrupt, datasets
 from motionlab.errors import MotionError, RetargetError, SolverError
 from motionlab.motion import Motion
 from motionlab.skeleton import Skeleton
-from motionlab.solvers import NoiseLevels, clean_recording, denoise
+from motionlab.solvers import NoiseLevels, clean_recording, denoise, denoise_rig
+from motionlab.solvers.denoise import Done
 from motionlab.solvers.denoise_rig import _at
 from motionlab.solvers.denoise_seen import (
+    YAW,
     Seen,
     cross_validated,
     levels_of,
@@ -23,7 +25,7 @@ from motionlab.solvers.denoise_seen import (
     rows_of,
     smooth,
 )
-from motionlab.solvers.denoise_windows import Settings, _share, _windows
+from motionlab.solvers.denoise_windows import Job, Settings, _share, _windows
 
 LEVELS = NoiseLevels(0.02, 0.08)
 FEW = Settings(steps=3, rounds=1)
@@ -322,3 +324,25 @@ def test_means_of_frames_lag_nowhere_and_their_noise_is_told(times):
     noise = torch.randn(frames, 9, generator=chance).double()
     few, _ = _at(own, known, replace(seen, rows=noise), NoiseLevels(1.0, 1.0), times)
     assert float(few.rows.std()) == pytest.approx(levels.root_m, rel=0.05)
+
+
+def test_drift_of_what_the_network_found_is_taken_away_and_its_motion_left(
+    clips, model, monkeypatch
+):
+    """A few rounds of descent leave slow errors of place and heading, and habits; both are in plain sight."""
+    truth = rows_of(model.encoding, clips[0])
+    time = torch.arange(len(truth)).double() / 30
+    drift = torch.zeros_like(truth)
+    drift[:, :3], drift[:, YAW], drift[:, 6:] = 0.03 * time[:, None], 0.05 * time, 0.1
+    quick = 0.02 * (2 * torch.pi * 5 * time).sin()[:, None]
+    found = Done(truth + drift + quick, "map", 60.0, 50.0, None)
+    monkeypatch.setattr(denoise_rig, "clean_jobs", lambda *_, **__: [found])
+    there = torch.ones(truth.shape, dtype=torch.bool)
+    seen = Seen(truth, there, torch.zeros(len(truth), dtype=torch.bool))
+    job = Job(seen, LEVELS, truth, truth)
+    left = denoise_rig._solved(model, job, Settings(), True, False).rows - truth
+    assert (left - quick).abs().max() < 0.1 * drift.abs().max()
+    # where nothing was seen, nothing says that it drifts
+    seen.mask[:, 6:] = False
+    left = denoise_rig._solved(model, job, Settings(), True, False).rows - truth
+    assert torch.allclose(left[:, 6:], (drift + quick)[:, 6:])

@@ -14,18 +14,26 @@ from torch import Tensor
 from ..motion import Motion
 
 WORST = 4  # joints whose curves are drawn
-WIDE, HIGH = 640, 120  # of a picture, in its own units
+WIDE, HIGH = (
+    600,
+    90,
+)  # of a picture, in its own units; it is stretched to the page, its words are not
 MOST = 1200  # points of a line: a screen has no more
 _STYLE = """<style>
-.curve { width: 100%; height: auto; display: block; margin: 0.2rem 0 1rem; }
-.curve line { stroke: currentColor; opacity: 0.35; }
-.curve text { fill: currentColor; font: 11px system-ui, sans-serif; }
-.curve polyline { fill: none; stroke-width: 1.5; }
-.curve .wild { fill: #c00000; }
+.curve { display: grid; grid-template-columns: auto 1fr; gap: 0 0.4rem; font-size: 0.75rem; margin: 0.2rem 0 1rem; }
+.curve svg { grid-row: 1 / 3; grid-column: 2; width: 100%; height: 6rem; display: block;
+  border-bottom: 1px solid color-mix(in srgb, currentColor 40%, transparent); }
+.curve .low { align-self: end; } .curve .high, .curve .low { text-align: right; min-width: 3.2rem; }
+.curve .time { grid-column: 2; display: flex; justify-content: space-between; }
+.curve polyline, .curve line { fill: none; stroke-width: 1.5; vector-effect: non-scaling-stroke; }
+.curve .wild { stroke: #c00000; stroke-width: 2; }
+ul.said { margin: 0.5rem 0; padding-left: 1.2rem; }
 .before { stroke: #c26a00; } .after { stroke: #1f77d0; }
 .key { display: inline-block; width: 1.2em; border-top: 3px solid; vertical-align: middle; }
 table { border-collapse: collapse; margin: 0.5rem 0; }
-td, th { padding: 0.1rem 0.8rem 0.1rem 0; text-align: right; } th:first-child, td:first-child { text-align: left; }
+td, th { padding: 0.1rem 0.8rem 0.1rem 0; text-align: right; vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; }
+@media (max-width: 40rem) { table { font-size: 0.75rem; } td, th { padding-right: 0.4rem; } }
 .wide { overflow-x: auto; } h2 { font-size: 1.05rem; margin: 1.2rem 0 0.2rem; }
 </style>
 """
@@ -51,8 +59,15 @@ def write_report(
         colors=["#c26a00", "#1f77d0"],
     )  # fmt: skip
     title = f"{before.name or 'A recording'}, cleaned"
-    page = whole_page(figure, title, "; ".join(said), below=_below(before, after, list(wild)))
+    below = _said(said) + _below(before, after, list(wild))
+    page = whole_page(figure, title, said[0] if said else "", below=below)
     write_whole(path, lambda stream: stream.write(page.encode()))
+
+
+def _said(said: Sequence[str]) -> str:
+    """In a list what was done, as HTML; its first line stands above the player."""
+    lines = "".join(f"<li>{html.escape(line)}</li>" for line in said[1:])
+    return f'<ul class="said">{lines}</ul>' if lines else ""
 
 
 def _below(before: Motion, after: Motion, wild: list[int]) -> str:
@@ -101,7 +116,7 @@ def _of_marks(wild: list[int]) -> str:
     if not wild:
         return ""
     frames = "a frame that was" if len(wild) == 1 else f"{len(wild)} frames that were"
-    return f" ▾ marks {frames} not believed, where a curve may leave the picture."
+    return f" A red line marks {frames} not believed, where a curve may leave the picture."
 
 
 def _angles(before: Motion, after: Motion) -> Tensor:
@@ -128,26 +143,22 @@ def _picture(lines: list[tuple[str, Tensor]], fps: float, unit: str, others: Ten
     low, high = float(values.min()), float(values.max())
     low, high = (low, high) if high - low > 1e-3 else (low - 1, high + 1)
     frames = len(lines[0][1])
-    across = lambda t: 40 + (WIDE - 50) * t / max(1, frames - 1)
-    up = lambda value: 8 + (HIGH - 30) * (high - min(max(value, low), high)) / (high - low)
+    across = lambda t: WIDE * t / max(1, frames - 1)
+    up = lambda value: 2 + (HIGH - 4) * (high - min(max(value, low), high)) / (high - low)
     step = max(1, math.ceil(frames / MOST))
     drawn = "".join(
+        f'<line class="wild" x1="{across(t):.1f}" x2="{across(t):.1f}" y1="0" y2="10">'
+        f"<title>frame {t}, not believed</title></line>"
+        for t in (~others).nonzero()[:, 0].tolist()
+    ) + "".join(
         f'<polyline class="{name}" points="'
         + " ".join(f"{across(t):.1f},{up(float(line[t])):.1f}" for t in range(0, frames, step))
         + '"/>'
         for name, line in lines
     )
-    drawn += "".join(
-        f'<text class="wild" x="{across(t):.1f}" y="9" text-anchor="middle">▾'
-        f"<title>frame {t}, not believed</title></text>"
-        for t in (~others).nonzero()[:, 0].tolist()
-    )
-    floor = HIGH - 22
     return (
-        f'<svg class="curve" viewBox="0 0 {WIDE} {HIGH}" role="img">'
-        f'<line x1="40" y1="{floor}" x2="{WIDE - 10}" y2="{floor}"/>'
-        f'<text x="0" y="16">{high:.0f} {unit}</text><text x="0" y="{floor}">{low:.0f} {unit}</text>'
-        f'<text x="40" y="{HIGH - 6}">0 s</text>'
-        f'<text x="{WIDE - 10}" y="{HIGH - 6}" text-anchor="end">{(frames - 1) / fps:.1f} s</text>'
-        f"{drawn}</svg>"
+        f'<div class="curve"><span class="high">{high:.0f} {unit}</span>'
+        f'<span class="low">{low:.0f} {unit}</span>'
+        f'<svg viewBox="0 0 {WIDE} {HIGH}" preserveAspectRatio="none" role="img">{drawn}</svg>'
+        f'<span class="time"><span>0 s</span><span>{(frames - 1) / fps:.1f} s</span></span></div>'
     )

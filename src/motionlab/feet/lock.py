@@ -20,7 +20,7 @@ from ..kinematics import forward_kinematics
 from ..motion import Motion
 from ..skeleton import Skeleton
 from .legs import PARTS, flat_toes, knee_fronts, leg_joints, leg_lengths, legs_alone
-from .marks import clean, distance, numbered, resting
+from .marks import clean, distance, longest, numbered, resting
 from .planting import off_the_floor, steps
 
 FASTEST = 0.9  # m/s, twice the labels' threshold; a faster foot doesn't rest, whatever its label
@@ -41,6 +41,7 @@ def lock_feet(
     floor: float | None = 0.0,
     blend: float = BLEND,
     deepest: float = math.inf,
+    level: bool = True,
 ) -> Motion:
     """The motion with its toes held still while they are in contact.
 
@@ -53,7 +54,10 @@ def lock_feet(
     floor : height of the floor in metres. None: where toes lie while they are in contact.
     blend : seconds over which a foot eases into a contact, and out of it.
     deepest : metres that the body may come down for a foot to reach its place; one that asks for more is
-        let go. It may be a little more where the body eases down.
+        let go until it comes down anew. It may be a little more where the body eases down.
+    level : whether toes in contact are all at one height, the floor's. False: each stays as high as it is,
+        frame by frame, and only slides are taken away. Toes of true walks rise and sink by a centimetre or
+        two as the foot rolls, and legs that are nearly straight reach no farther down.
 
     Returns
     -------
@@ -72,7 +76,7 @@ def lock_feet(
         )
     place, rotations = lock(
         motion.skeleton, motion.root_positions, motion.rotations, contacts, motion.fps,
-        floor=floor, blend=blend, deepest=deepest,
+        floor=floor, blend=blend, deepest=deepest, level=level,
     )  # fmt: skip
     return replace(motion, root_positions=place, rotations=rotations)
 
@@ -87,6 +91,7 @@ def lock(
     floor: float | None = 0.0,
     blend: float = BLEND,
     deepest: float = math.inf,
+    level: bool = True,
 ) -> tuple[Tensor, Tensor]:
     """`lock_feet` for many motions of equal length at once.
 
@@ -109,22 +114,24 @@ def lock(
     speeds = steps(toes) * fps
     held = resting(clean(contacts & (speeds < FASTEST), fps), speeds < RESTS)
     flat = flat_toes(legs, points, held)
-    ground = _ground(toes, held, flat, floor)
+    ground = _ground(toes, held, flat, floor) if level else None
     for _ in range(2):  # a foot that is dragged along is let go, and then its place is another
         onto = _onto_places(toes, held, ground)
         rests = held & (length(onto) < FARTHEST)
         if deepest < math.inf:
             ankle = at["foot"] + onto
             ankle[..., 1] -= _usual(onto[..., 1], held)  # what a lower floor asks of all alike
-            rests = rests & (_needed(at, ankle) <= deepest)
+            rests = longest(rests & (_needed(at, ankle) <= deepest), held)
         held = rests
     shift = _shift(_onto_places(toes, held, ground), held, blend * fps)
-    shift = _above(shift, at, ground, ground - flat)
+    toe_heights = None
+    if level:
+        shift = _above(shift, at, ground, ground - flat)
+        toe_heights = toes[..., 1] + shift[..., 1] - (ground - flat)[..., None, :]
     ankle = at["foot"] + shift
 
     sunk = root_positions - _sink(at, ankle, fps)
     hips = at["upper_leg"] + (sunk - root_positions)[..., None, :]
-    toe_heights = toes[..., 1] + shift[..., 1] - (ground - flat)[..., None, :]
     rotations = rotations.clone()
     for joint, turn in _bent(legs, joints, points, world, hips, ankle, toe_heights).items():
         rotations[..., kept[joint], :, :] = turn
@@ -147,10 +154,10 @@ def _usual(values: Tensor, held: Tensor) -> Tensor:
     return torch.nan_to_num(median, nan=0.0)
 
 
-def _onto_places(toes: Tensor, held: Tensor, ground: Tensor) -> Tensor:
+def _onto_places(toes: Tensor, held: Tensor, ground: Tensor | None) -> Tensor:
     """How far toes are from their places (..., frames, 2, 3) while they are held, else 0.
 
-    A place is where a toe joint is on average over one contact, on the ground.
+    A place is where a toe joint is on average over one contact, on the ground; None: as high as it is.
     """
     number = numbered(held).mT[..., None, :]
     along = toes.movedim(-3, -1)  # frames last, as they lie in memory
@@ -159,8 +166,11 @@ def _onto_places(toes: Tensor, held: Tensor, ground: Tensor) -> Tensor:
     sums = none.scatter_add(-1, index, along)
     counts = none[..., :1, :].scatter_add(-1, number, torch.ones_like(along[..., :1, :]))
     places = sums / counts.clamp(min=1)
-    places[..., 1, :] = ground[..., None]
+    if ground is not None:
+        places[..., 1, :] = ground[..., None]
     onto = (places.gather(-1, index) - along) * held.mT[..., None, :]
+    if ground is None:
+        onto[..., 1, :] = 0
     return onto.movedim(-1, -3)
 
 
@@ -228,7 +238,7 @@ def _smoothed_over(values: Tensor, sigma: float) -> Tensor:
 
 def _bent(
     skeleton: Skeleton, joints: dict, points: Tensor, world: Tensor,
-    hips: Tensor, ankle: Tensor, toe_heights: Tensor,
+    hips: Tensor, ankle: Tensor, toe_heights: Tensor | None,
 ) -> dict[int, Tensor]:  # fmt: skip
     """Local rotations of legs that reach their ankles, by joint; feet keep the way they point."""
     rotations = {}
@@ -246,7 +256,9 @@ def _bent(
             lower: product(shortest_turn(shin_was, shin), world[..., lower, :, :]),
             foot: world[..., foot, :, :],
         }
-        if foot != toes < skeleton.joints:  # a joint, not the end of the foot
+        if (
+            foot != toes < skeleton.joints and toe_heights is not None
+        ):  # a joint, not the end of the foot
             turned[toes] = _toes_up(skeleton, toes, world, toe_heights[..., i])
         for joint, whole in turned.items():
             above = _carried(skeleton, skeleton.parents[joint], turned, world)

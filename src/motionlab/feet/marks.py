@@ -51,6 +51,21 @@ def resting(held: Tensor, still: Tensor) -> Tensor:
     return held & (within | ~most.gather(-2, number))
 
 
+def longest(marks: Tensor, held: Tensor) -> Tensor:
+    """Of the marks (..., frames, 2) in each contact of `held` the longest run, the first if there are two.
+
+    A foot that was let go and taken up again a few frames later would be pulled to and fro.
+    """
+    run, number = numbered(marks), numbered(held)
+    frames = torch.arange(held.shape[-2], device=held.device)[:, None].expand_as(number)
+    none = torch.zeros_like(torch.cat([number[..., :1, :], number], dim=-2))
+    counts = none.scatter_add(-2, run, torch.ones_like(run)).gather(-2, run)
+    first = none.scatter_reduce(-2, run, frames, "amin", include_self=False).gather(-2, run)
+    rank = (counts * held.shape[-2] - first) * marks
+    best = none.scatter_reduce(-2, number, rank, "amax").gather(-2, number)
+    return marks & (rank == best)
+
+
 def numbered(held: Tensor) -> Tensor:
     """Which contact each frame (..., frames, 2) belongs to, from 1; 0 where there is none."""
     begins = held & ~torch.cat([torch.zeros_like(held[..., :1, :]), held[..., :-1, :]], dim=-2)

@@ -87,7 +87,7 @@ def denoise(
     contacts : whether feet that are down are to stand (eq. 19).
     settings : see `denoise_windows.Settings`.
     generator : source of chance, of which there is none unless the method is a swarm.
-    progress : show a bar.
+    progress : show a bar, on a terminal.
 
     Returns
     -------
@@ -178,7 +178,8 @@ def clean_jobs(
     needed = [job for job in jobs if always or not needs_nothing(job)]
     total = how.rounds * sum(len(job.rows) for job in needed)
     found: list[Cleaned] = []
-    with tqdm(total=total, unit="frame", disable=not progress, leave=False) as bar:
+    hidden = None if progress else True  # None: unless a terminal looks on
+    with tqdm(total=total, unit="frame", disable=hidden, leave=False) as bar:
         for _ in range(how.rounds if needed else 0):
             for job in needed:
                 job.contacts = resting(encoding, job.rows, how.slow)[:, [1, 3]].double()

@@ -97,8 +97,14 @@ def check_clip(encoding: JointAngles, clip: Motion) -> None:
     if off > FARTHEST:
         raise SolverError(
             f"{called(clip)}: its root is {off:.0f} m above or below where it is when the body stands. Are "
-            "its lengths in metres, and is y up? read_bvh(path, units='mm') reads millimetres."
+            "its lengths in metres (units='mm' reads millimetres), and is y up?"
         )
+
+
+def other_unit(too_large: bool) -> str:
+    """What to do about a body of no person's size, in words."""
+    than, some = ("smaller", "'cm' or units='mm'") if too_large else ("larger", "'cm' or units='m'")
+    return f"Its unit is {than} than the one it was read in; try units={some}."
 
 
 def check_levels(noise: Any) -> NoiseLevels:

@@ -53,8 +53,11 @@ from .denoise_checks import (
     check_model,
     check_settings,
     mask_of,
+    other_unit,
 )
+from .denoise_known import least
 from .denoise_seen import (
+    YAW,
     NoiseLevels,
     Seen,
     cross_validated,
@@ -67,6 +70,9 @@ from .denoise_seen import (
 from .denoise_windows import Job, Settings
 
 SMALLEST, LARGEST = 0.3, 5.0  # m from foot to head: infants and giants
+# Shares of the accelerations that a body is free to have, by which the root's place and heading, and its
+# pose, are freed of drift; of 6 each from 0.01 to 1 those with the least error on validation walks.
+DRIFT_ROOT, DRIFT_POSE = 0.3, 0.01
 _LIMBS = tuple(
     tuple(f"{side}_{part}" for part in parts)
     for side in SIDES
@@ -108,8 +114,8 @@ def clean_recording(
     size = foot_to_head(motion.skeleton)
     if size is not None and not SMALLEST < size < LARGEST:
         raise SolverError(
-            f"{called(motion)} is of a body of {size:.3g} m from foot to head. Are lengths in metres? "
-            "read_bvh(path, units='mm') reads millimetres."
+            f"{called(motion)} is of a body of {size:.3g} m from foot to head. "
+            + other_unit(too_large=size >= LARGEST)
         )
     there = mask_of(motion, missing)
     known = known_everywhere(motion, there)
@@ -131,11 +137,11 @@ def clean_recording(
         scale = limb_length(body.skeleton, "leg") / limb_length(motion.skeleton, "leg")
         theirs = NoiseLevels(scale * levels.root_m, levels.angle_rad)
         its = Seen(rows, channel_mask(joints), seen.outliers)
-        done = _cleaned(model, its, theirs, motion.fps, how, progress)
+        same = motion.skeleton.matches(encoding.skeleton)
+        done = _cleaned(model, its, theirs, motion.fps, how, not same, progress)
         found = line
         if done.way == "map":
             after = replace(motion_of(encoding, done.rows, body), fps=body.fps)
-            same = motion.skeleton.matches(encoding.skeleton)
             found = after if same else brought_back(line, body, after)
         if calm(levels):
             found = as_seen(motion, found, believed_joints(seen))
@@ -183,25 +189,39 @@ def _own_where_not_shared(known: Motion, line: Motion, believed: Tensor, body: S
 
 
 def _cleaned(
-    model: LstmGmm, seen: Seen, levels: NoiseLevels, fps: float, how: Settings, progress: bool
-) -> Done:
-    """What came of a recording on the network's body; rows at the recording's rate."""
+    model: LstmGmm, seen: Seen, levels: NoiseLevels, fps: float, how: Settings, other: bool,
+    progress: bool,
+) -> Done:  # fmt: skip
+    """What came of a recording on the network's body; rows at its own rate. other : whether of another rig."""
     rate = model.encoding.fps
     line = smooth(seen, levels, fps)
     if abs(fps - rate) <= 1e-4 * rate:
-        return clean_jobs(
-            model, [Job(seen, levels, line, line)], how, progress=progress, always=True
-        )[0]
+        return _solved(model, Job(seen, levels, line, line), how, other, progress)
     own = torch.arange(len(line)).double() / fps
     known = torch.arange(int(own[-1] * rate + 1e-6) + 1).double() / rate
     few, fewer = _at(own, known, seen, levels, fps / rate)
     start = _between(own, line, known)
-    (done,) = clean_jobs(
-        model, [Job(few, fewer, start, start)], how, progress=progress, always=True
-    )
+    done = _solved(model, Job(few, fewer, start, start), how, other, progress)
     change = CubicSpline(known.numpy(), (done.rows - start).numpy(), bc_type="natural")
     change = torch.from_numpy(change(np.clip(own.numpy(), 0, float(known[-1]))))
     return done._replace(rows=line + change)
+
+
+def _solved(model: LstmGmm, job: Job, how: Settings, other: bool, progress: bool) -> Done:
+    """What the network makes of a clip, brought back to what was seen where it drifts off.
+
+    It seeks steps, and an error of one goes on in all frames after it: what a few rounds of descent leave
+    of place and heading is slow, and more than the noise of means of many frames. So are habits, such as
+    how far arms hang from the trunk. A line that is stiffer than any motion, through what was seen less
+    what was found, is neither motion nor noise.
+    """
+    if other and how.least is None:
+        how = replace(how, least=least(job.noise, other_rig=True))
+    (done,) = clean_jobs(model, [job], how, progress=progress, always=True)
+    left = replace(job.seen, rows=job.seen.rows - done.rows)
+    drift = smooth(left, job.noise, model.encoding.fps, (DRIFT_ROOT, DRIFT_POSE))
+    drift[:, YAW] = smooth(left, job.noise, model.encoding.fps, (DRIFT_ROOT, DRIFT_ROOT))[:, YAW]
+    return done._replace(rows=done.rows + drift)
 
 
 def _at(

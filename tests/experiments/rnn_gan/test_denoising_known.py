@@ -64,6 +64,11 @@ def test_the_line_in_use_is_the_one_that_was_fitted():
     assert found["split"] == "val"
     assert found["at one"] == pytest.approx(denoise_known.AT_ONE, abs=0.06)
     assert found["slope"] == pytest.approx(denoise_known.SLOPE, abs=0.06)
+    rigs = found["other rigs"]
+    assert rigs["at one"] == pytest.approx(denoise_known.RIGS_AT_ONE, abs=0.06)
+    assert rigs["slope"] == pytest.approx(denoise_known.RIGS_SLOPE, abs=0.06)
+    rigs_cases = [known.Case(**its) for its in found["cases"] if its["where"] != "own body"]
+    assert known.fitted(rigs_cases) == pytest.approx((rigs["at one"], rigs["slope"]), abs=0.06)
 
 
 def rows(error=2.0, hit=8.0, skate=10.0):
