@@ -13,18 +13,17 @@ player and the first scene of a page are enough. It waits as long as a busy mach
 """
 
 import functools
-import http.server
 import io
 import sys
-import threading
 import time
 from collections.abc import Callable
-from contextlib import contextmanager
+from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
 
 from check_access import check_access
 from check_steered import check_steered
+from local_server import local_server
 from PIL import Image
 from playwright.sync_api import BrowserContext, Page, TimeoutError, sync_playwright
 
@@ -288,22 +287,6 @@ def contrast(png: bytes) -> int:
     return lightest - darkest
 
 
-@contextmanager
-def local_server(folder: Path):
-    class Quiet(http.server.SimpleHTTPRequestHandler):
-        def log_message(self, *args):
-            pass
-
-    class Server(http.server.ThreadingHTTPServer):
-        def handle_error(self, request, client_address):
-            pass  # the browser left while a page was on its way
-
-    with Server(("127.0.0.1", 0), functools.partial(Quiet, directory=str(folder))) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}/"
-        server.shutdown()
-
-
 def chromium() -> str:
     found = find_chromium()
     if not found:
@@ -354,26 +337,43 @@ def own_weight(loaded: set[str], base: str, folder: Path) -> int:
     return sum(path.stat().st_size for path in own if path.is_file())
 
 
-def check(folder: Path, served: bool = True) -> list[str]:
-    """All troubles of the book in this folder, one line each; from disk alone, or from a server, too."""
-    troubles = []
+def check(folder: Path, served: bool = True, at_once: int = 1) -> list[str]:
+    """All troubles of the book in this folder, one line each; from disk alone, or from a server, too.
+
+    at_once : browsers that share the pages.
+    """
     pages = sorted(p for p in folder.rglob("*.html") if "_static" not in p.parts)
-    with local_server(folder) as server, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
+    with local_server(folder) as server:
         bases = (folder.as_uri() + "/", server)[: 1 + served]
-        for base, (width, height) in product(bases, (DESKTOP, PHONE)):
-            window = browser.new_context(viewport={"width": width, "height": height})
-            where = f"{base.split(':')[0]}, {width} px"
-            troubles += [f"{where}: search: {t}" for t in check_search(window, base)]
+        tasks = []
+        for base, size in product(bases, (DESKTOP, PHONE)):
             # Listings of source code are all alike: the narrow window, from disk, is enough.
-            listings = base.startswith("file:") and width == PHONE[0]
+            listings = base.startswith("file:") and size == PHONE
             opened = [p for p in pages if listings or "_modules" not in p.parts]
-            for path in opened:
-                found = check_page(window, base, path, folder)
-                troubles += [f"{where}: {path.relative_to(folder)}: {t}" for t in found]
-            print(f"{where}: {len(opened)} pages opened", flush=True)
-            window.close()
+            tasks += [(folder, base, size, opened[i::at_once], not i) for i in range(at_once)]
+        if at_once == 1:
+            return [trouble for task in tasks for trouble in check_pages(*task)]
+        with ProcessPoolExecutor(at_once) as pool:
+            waiting = [pool.submit(check_pages, *task) for task in tasks]
+            return [trouble for task in waiting for trouble in task.result()]
+
+
+def check_pages(
+    folder: Path, base: str, size: tuple[int, int], pages: list[Path], search: bool
+) -> list[str]:
+    """Troubles of some pages in a window of one size, and of the search."""
+    width, height = size
+    where, troubles = f"{base.split(':')[0]}, {width} px", []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
+        window = browser.new_context(viewport={"width": width, "height": height})
+        if search:
+            troubles += [f"{where}: search: {t}" for t in check_search(window, base)]
+        for path in pages:
+            found = check_page(window, base, path, folder)
+            troubles += [f"{where}: {path.relative_to(folder)}: {t}" for t in found]
         browser.close()
+    print(f"{where}: {len(pages)} pages opened", flush=True)
     return troubles
 
 
@@ -381,7 +381,7 @@ def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "book/_build/html").resolve()
     if not (folder / "index.html").exists():
         sys.exit(f"{folder} holds no built book; run `make book` first.")
-    troubles = check(folder)
+    troubles = check(folder, at_once=2)
     for trouble in troubles:
         print("TROUBLE", trouble)
     print(f"{len(troubles)} troubles")

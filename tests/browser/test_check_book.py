@@ -103,4 +103,4 @@ def test_a_player_that_saves_nothing_is_found(troubles):
 def test_good_pages_pass(troubles, tmp_path):
     assert not [line for line in troubles if "index.html" in line or "search" in line]
     write(tmp_path, GOOD)
-    assert check_book.check(tmp_path) == []
+    assert check_book.check(tmp_path, at_once=2) == []

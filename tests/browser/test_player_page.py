@@ -263,7 +263,22 @@ def test_out_of_sight_it_holds_no_picture_and_in_print_it_does(browser, page_fil
         assert page.evaluate(held)[0] == [False, 1] and page.evaluate(held)[17][0]
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
         assert all(casts and width > 100 for casts, width in page.evaluate(held))
+        page.emulate_media(media="print")  # where each is a strip of moments that differ
+        strips = page.evaluate(
+            "() => [...document.querySelectorAll('figure')].map(f => "
+            "[...f.querySelectorAll('.ml-strip img')].map(i => i.src))"
+        )
+        assert all(len(set(moments)) == len(moments) >= 3 for moments in strips)
+        first = page.locator("figure").first
+        assert (
+            first.locator(".ml-strip").is_visible() and not first.locator(".ml-view").is_visible()
+        )
+        page.emulate_media(media="screen")
+        assert (
+            first.locator(".ml-view").is_visible() and not first.locator(".ml-strip").is_visible()
+        )
         page.evaluate("dispatchEvent(new Event('afterprint'))")
+        assert page.locator(".ml-strip").count() == 0
         assert page.evaluate(held)[0] == [False, 1] and page.evaluate(held)[17][0]
         page.set_viewport_size({"width": 700, "height": 100})
         page.evaluate(

@@ -10,7 +10,7 @@ from study_cases import sources
 from motionlab.studies.analysis import analyse
 from motionlab.studies.answers import read_answers
 from motionlab.studies.build import build
-from motionlab.studies.page import study_page
+from motionlab.studies.page import study_here, study_page
 from motionlab.studies.report import in_words
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
@@ -279,3 +279,21 @@ def test_without_webgl_nobody_judges_what_is_not_seen(browser, folder):
     assert page.get_by_role("button", name="Play").is_disabled()
     assert page.get_by_role("button", name="Next").is_disabled()
     window.close()
+
+
+def test_in_a_notebook_it_is_a_page_within_the_page_and_keeps_answers(browser, folder, monkeypatch):
+    monkeypatch.delenv("MOTIONLAB_VIEWER", raising=False)
+    built = build(sources(methods=("RNN", "mocap"), kinds=("walk",), seconds=1.0), checks=0)
+    cell = study_here(built, reveal=True)._repr_html_()
+    (folder / "cell.html").write_text(f"<!doctype html><p>a cell</p>{cell}", encoding="utf-8")
+    page = browser.new_context(offline=True).new_page()
+    page.goto((folder / "cell.html").as_uri())
+    inside = page.frame_locator("iframe")
+    inside.get_by_label("I am an adult").check()
+    inside.get_by_role("button", name="Begin").click()
+    inside.get_by_role("heading", name="Practice").wait_for()
+    page.reload()
+    inside.get_by_role("heading", name="Practice").wait_for()
+    page.context.close()
+    monkeypatch.setenv("MOTIONLAB_VIEWER", "page")  # a built page has the script already
+    assert "iframe" not in study_here(built).html

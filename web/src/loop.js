@@ -1,4 +1,6 @@
-// One loop moves all players that can be seen; before a page is printed, all others show themselves, too.
+// One loop moves all players that can be seen; before a page is printed, all show strips of themselves.
+import { addStrip, removeStrip } from "./print.js";
+
 const turning = new Set();
 const waiting = new Set(); // players out of sight, which hold no picture
 let last = null;
@@ -31,11 +33,10 @@ function turn(now) {
 }
 
 globalThis.addEventListener?.("beforeprint", () => {
-  for (const player of waiting) {
-    player.enter();
-    player.tick(0);
-  }
+  for (const player of waiting) player.enter();
+  for (const player of [...turning, ...waiting]) addStrip(player);
 });
 globalThis.addEventListener?.("afterprint", () => {
+  for (const player of [...turning, ...waiting]) removeStrip(player);
   for (const player of waiting) player.leave();
 });

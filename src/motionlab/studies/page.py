@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import os
 
 from ..viewer.live.figure import PageFigure
 from ..viewer.live.whole_page import whole_page
@@ -26,6 +28,18 @@ def study_figure(built: Built, *, reveal: bool = False) -> PageFigure:
         f'<script type="application/json">{data}</script>'
         "<noscript>This study needs JavaScript: allow scripts for this page, and reload it.</noscript>"
         "</figure>"
+    )
+
+
+def study_here(built: Built, *, reveal: bool = False, height: int = 720) -> PageFigure:
+    """The study where a notebook is read: in a built page as `study_figure`, in a kernel as a page within
+    the page, `height` pixels high."""
+    if os.environ.get("MOTIONLAB_VIEWER") == "page":
+        return study_figure(built, reveal=reveal)
+    page = html.escape(study_page(built, reveal=reveal))
+    title = html.escape(built.study.title)
+    return PageFigure(
+        f'<iframe srcdoc="{page}" title="{title}" style="width: 100%; height: {height}px; border: 0"></iframe>'
     )
 
 

@@ -16,10 +16,12 @@ from .pictures import palette
 _LATER = {
     **dict.fromkeys(("still", "filmstrip", "stack", "video"), ".pictures.stills"),
     "scene": ".live.scene3d",
+    "diagram": ".pictures.diagram",
 }
 __all__ = [
     "Player",
     "bundle_path",
+    "diagram",
     "draw_path",
     "dream",
     "feeding",
