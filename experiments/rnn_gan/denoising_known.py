@@ -1,6 +1,6 @@
 """Where does the network not know a motion? The line of `solvers.denoise_known`, fitted.
 
-    python -m experiments.rnn_gan.denoising_known [--clips 5] [--rigs-alone]
+    python -m experiments.rnn_gan.denoising_known [--clips 5]
 
 Validation clips alone: pieces on the network's own body, and recordings on the rigs that they were made
 on, so that the error of bringing them over and back is in it. Each gets noise, and is cleaned twice: as
@@ -14,13 +14,11 @@ is a little strange to the network on its own body. Of lines as good as the best
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
-from pathlib import Path
 from typing import NamedTuple
 
 import torch
@@ -76,20 +74,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--data", default="everything")
     parser.add_argument("--clips", type=int, default=5, help="of each kind, on the own body")
     parser.add_argument("--output", default="results/denoising_known.json")
-    parser.add_argument(
-        "--rigs-alone", action="store_true", help="take cases on the own body from the last result"
-    )
     chosen = parser.parse_args(arguments)
     begin = time.perf_counter()
     model = motionlab.load(NAME).requires_grad_(False)
     data = Prepared.find(chosen.data).matching(model.encoding)
     found = []
-    own = last_ones(chosen.output) if chosen.rigs_alone else own_body(model, data, chosen.clips)
-    for case in chain(own, on_rigs(model)):
+    for case in chain(own_body(model, data, chosen.clips), on_rigs(model)):
         found.append(case)
         print(*(f"{x:.3g}" if isinstance(x, float) else x for x in case), flush=True)
-    line, rigs = lines_of(found, chosen.output if chosen.rigs_alone else None)
     own_cases, rigs_cases = split(found)
+    line, rigs = fitted(own_cases), fitted(rigs_cases)
     named = lambda its: dict(zip(("at one", "slope"), its, strict=True))
     result = {
         "weights": record.about_weights(model, find(NAME)), "split": "val",
@@ -102,25 +96,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     record.write(record.provenance(begin, 0, data) | record.rounded(result), chosen.output)
 
 
-def last_ones(path: str) -> list[Case]:
-    """Cases on the own body of a result, for when only what is done on other rigs was changed."""
-    cases = json.loads(Path(path).read_text(encoding="utf-8"))["cases"]
-    return [Case(**case) for case in cases if case["where"] == "own body"]
-
-
 def split(found: Iterable[Case]) -> tuple[list[Case], list[Case]]:
     """Cases on the own body, and on other rigs."""
     own = [case for case in found if case.where == "own body"]
     return own, [case for case in found if case.where != "own body"]
-
-
-def lines_of(found: Sequence[Case], last: str | None) -> tuple[tuple[float, float], ...]:
-    """The lines of the own body, fitted or that of the last result, and of other rigs."""
-    own, rigs = split(found)
-    if last is None:
-        return fitted(own), fitted(rigs)
-    before = json.loads(Path(last).read_text(encoding="utf-8"))
-    return (before["at one"], before["slope"]), fitted(rigs)
 
 
 @torch.no_grad()
