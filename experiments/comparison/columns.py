@@ -15,6 +15,7 @@ from typing import NamedTuple
 STARTS = (
     48  # of a gait, spread evenly over the test clips that are long enough (validation for critics)
 )
+FEW = 12  # starts of a method that takes minutes a start
 SEEN, SECONDS = 2.0, 5.0  # of a clip that a method sees; of what it makes
 LONG_STARTS, LONG = 8, 20_000  # starts of a gait, and frames, for survival
 SAMPLES, AFTER = 50, 5.0  # from one start, for variety; seconds after which it is forgotten
