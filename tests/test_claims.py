@@ -359,9 +359,7 @@ def test_a_training_under_way_is_gone_on_with(clone, capsys):
     ("names", "said"), [(("W99",), "no claim 'W99'"), (("W1", "W9"), "W9: is open")]
 )
 def test_reproduce_of_what_is_not_there(clone, names, said):
-    without = [
-        {"id": claim["id"]} if claim["id"] == "W9" else claim for claim in CLAIMS
-    ]  # as if it had no rule
+    without = [{"id": "W9"} if its["id"] == "W9" else its for its in CLAIMS]  # it has no rule
     text = yaml.safe_dump({"claims": without, "steps": STEPS})
     (clone / FILE).write_text(text, encoding="utf-8")
     with pytest.raises(MotionLabError, match=said):

@@ -16,6 +16,7 @@ from motionlab.training.judging import critic
 
 from ..common import rollouts
 from ..rnn_gan import samples
+from .begun import Begun
 from .columns import AFTER, LONG, LONG_STARTS, MILLISECONDS, PIECE, SAMPLES, SECONDS, SHUFFLES
 from .going_on import GoOn
 from .real import Gait, Real
@@ -52,15 +53,24 @@ def qualities(motions: Sequence[Tensor], gait: Gait) -> dict[str, list]:
     }
 
 
-def lasting(go_on: GoOn, real: Real, gait: Gait, frames: int = LONG) -> dict:
-    """What became of long rollouts."""
-    chosen = rollouts.spread_evenly(len(gait.begun["test"]), LONG_STARTS)
-    made = go_on(gait.begun["test"][chosen], frames, seed=0)
-    failed = [real.judge.failures(points.contiguous()) for points in made]
+def lasting(go_on: GoOn, real: Real, gaits: Sequence[Gait], frames: int = LONG) -> dict[str, dict]:
+    """What became of long rollouts of each gait, all of them side by side."""
+    starts = [
+        gait.begun["test"][rollouts.spread_evenly(len(gait.begun["test"]), LONG_STARTS)]
+        for gait in gaits
+    ]
+    together = Begun(torch.cat([some.rows for some in starts]), starts[0].encoding)
+    made = go_on(together, frames, seed=0).split([len(some) for some in starts])
+    return {gait.name: fates(points, real) for gait, points in zip(gaits, made, strict=True)}
+
+
+def fates(made: Tensor, real: Real) -> dict:
+    """When and how rollouts (rollouts, frames, joints, 3) failed."""
+    failed, seconds = [real.judge.failures(p.contiguous()) for p in made], made.shape[1] / real.fps
     lasted = np.array([min(its.values()) for its in failed])
-    curve = metrics.survival(lasted, frames / real.fps)
+    curve = metrics.survival(lasted, seconds)
     return {
-        "rollouts": len(failed), "seconds each": frames / real.fps,
+        "rollouts": len(failed), "seconds each": seconds,
         "alive": {"value": float(np.isinf(lasted).mean()), "low": float(curve.low[-1]),
                   "high": float(curve.high[-1])},
         "failed": {kind: sum(math.isfinite(its[kind]) for its in failed) for kind in rollouts.KINDS},

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from torch import nn
@@ -109,7 +110,10 @@ def goes(name: str, model: nn.Module, data: Prepared) -> GoOn:
     if name == "RNN":
         clips = data.matching(model.encoding).clips("val")
         long = [clip for clip in clips if len(clip) >= OBSERVED * model.fps]
-        return going_on.angles(model, {"temperature": fit_temperature(model, long, seconds=10.0)})
+        fitted = cache(lambda: fit_temperature(model, long, seconds=10.0))
+        return lambda begun, frames, seed, quiet=False: going_on.angles(
+            model, {"temperature": fitted()}
+        )(begun, frames, seed, quiet)
     makers = {"acLSTM": going_on.around_root, "STRNN": going_on.body_frame, "PFNN": led.led}
     return makers[name](model)
 

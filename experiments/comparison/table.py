@@ -2,7 +2,8 @@
 
     python -m experiments.comparison.table [--as-it-is] [--only ROW ...] [--output results/comparison.json]
 
-Trains what is missing of `trainings`, then measures; with --as-it-is only what is there. What is measured stands
+Trains what is missing of `trainings`, then measures. With --as-it-is trainings, survival and what is searched
+for are taken as far as they are there, and what is missing is said. What is measured stands
 in columns.py, when one training is better than another in significance.py. What was measured of a method stays
 in runs/comparison/measured/, by its weights and the source: stopped and started again, it goes on. So do
 samples, to be looked at.
@@ -15,6 +16,7 @@ import hashlib
 import itertools
 import time
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +41,9 @@ ALIVE, VARIETY = "alive", "variety"
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", default="locomotion")
-    parser.add_argument("--as-it-is", action="store_true", help="train nothing, search for no path")
+    parser.add_argument(
+        "--as-it-is", action="store_true", help="of what takes long only what is there"
+    )
     parser.add_argument(
         "--only", nargs="+", metavar="TITLE", help="measure these, and write nothing"
     )
@@ -52,16 +56,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
     data = Prepared.find(chosen.data)
     real = Real(data)
     gaits = {name: real.of(name) for name in GAITS}
-    each = [*methods.trained(data), *methods.shipped()]
+    each = [*methods.shipped(), *methods.trained(data)]
     if chosen.only:
         each = [method for method in each if method.title in chosen.only]
-    elif chosen.as_it_is:  # what takes minutes a start only if it was made before
+    elif chosen.as_it_is:
         each = [method for method in each if not method.few or made_before(method)]
     found = {}
     for method, gait in itertools.product(each, gaits.values()):
         found[method, gait.name] = all_of(method, real, gait)
         print(f"{method.title} {method.seed}, {gait.name}: {time.perf_counter() - begin:.0f} s",
               flush=True)  # fmt: skip
+    for method in each:  # what takes longest comes last
+        if chosen.as_it_is and not path_of(method, ALIVE).is_file():
+            continue
+        if ALIVE not in method.without:
+            lasted = kept(method, ALIVE, lambda method=method: measures.lasting(
+                method.go_on, real, list(gaits.values())))  # fmt: skip
+            print(f"{method.title} {method.seed}, {ALIVE}: {time.perf_counter() - begin:.0f} s",
+                  flush=True)  # fmt: skip
+            for gait, its in lasted.items():
+                found[method, gait][ALIVE] = its
     if chosen.only is None:
         result = told(each, found, real, gaits)
         record.write(record.provenance(begin, 0, data) | result, chosen.output)
@@ -95,10 +109,10 @@ def all_of(method: Method, real: Real, gait: Gait) -> dict:
     found[CRITIC] = kept(
         method, f"{gait.name}-critic", lambda: critics(method, gait, learned, good)
     )
-    for column, measure in ((ALIVE, measures.lasting), (VARIETY, measures.variety)):
-        if column not in method.without:
-            found[column] = kept(method, f"{gait.name}-{column}",
-                                 lambda measure=measure: measure(method.go_on, real, gait))  # fmt: skip
+    if VARIETY not in method.without:
+        found[VARIETY] = kept(
+            method, f"{gait.name}-{VARIETY}", lambda: measures.variety(method.go_on, real, gait)
+        )
     return found
 
 
@@ -139,8 +153,9 @@ def kept(method: Method, what: str, measure: Callable):
     return torch.load(path, weights_only=False)
 
 
+@cache
 def source() -> str:
-    """Of all that decides what is measured here: the files of this folder that make and measure motion."""
+    """Of the files of this folder that make and measure motion, as they were when this began."""
     names = ("begun", "columns", "going_on", "led", "measures", "real")
     code = b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in names)
     return hashlib.sha256(code).hexdigest()[:8]
@@ -158,7 +173,7 @@ def told(each: Sequence[Method], found: dict, real: Real, gaits: dict[str, Gait]
     ratios = speed.ratios(firsts, gaits["walk"].begun["test"])
     floor = {name: floor_of(gait) for name, gait in gaits.items()}
     told_rows = {
-        title: about(its) | {"frames a second, over the reference's": ratios[title], "gaits": {
+        title: about(its, found) | {"frames a second, over the reference's": ratios[title], "gaits": {
             gait: {column.name: cell(column.name, [found[m, gait] for m in its], gaits[gait])
                    for column in COLUMNS if column.name not in its[0].without}
             for gait in gaits}}
@@ -189,29 +204,26 @@ def told(each: Sequence[Method], found: dict, real: Real, gaits: dict[str, Gait]
     }  # fmt: skip
 
 
-def about(its: Sequence[Method]) -> dict:
+def about(its: Sequence[Method], found: dict) -> dict:
     """What a row is, whatever it does."""
-    first = its[0]
+    first, missing = its[0], {}
+    if any(ALIVE not in found[method, gait] for method in its for gait in GAITS):
+        missing[ALIVE] = "not measured yet"
     seeds = [method.seed for method in its if method.seed is not None]
     return {"name": first.name, "kind": first.kind, "what": first.what, "seeds": seeds,
             "parameters": first.parameters, "bytes": first.bytes, "frames seen": first.seen,
-            "left out": first.without}  # fmt: skip
+            "left out": missing | first.without}  # fmt: skip
 
 
 def cell(column: str, seeds: Sequence[dict], gait: Gait) -> dict | None:
     """Value of a row in a column with its interval over starts, and each seed's value."""
-    if column in (ALIVE, VARIETY):
-        each = [its[column][column if column == ALIVE else "value"] for its in seeds]
-        if column == VARIETY:
-            return {"value": float(np.mean(each)), "seeds": each}
-        values = [its["value"] for its in each]
-        ends = {end: float(np.mean([its[end] for its in each])) for end in ("value", "low", "high")}
-        how = {
-            kind: sum(its[ALIVE]["failed"][kind] for its in seeds)
-            for kind in seeds[0][ALIVE]["failed"]
-        }
-        return ends | {"seeds": values, "failed": how,
-                       "rollouts": sum(its[ALIVE]["rollouts"] for its in seeds)}  # fmt: skip
+    if any(column in (ALIVE, VARIETY) and column not in its for its in seeds):
+        return None
+    if column == VARIETY:
+        each = [its[VARIETY]["value"] for its in seeds]
+        return {"value": float(np.mean(each)), "seeds": each}
+    if column == ALIVE:
+        return survived([its[ALIVE] for its in seeds])
     if column == FRECHET:
         each = [metrics.jackknife(its["moments"], gait.frechet.distance)._asdict() for its in seeds]
         mean = {end: float(np.mean([its[end] for its in each])) for end in ("value", "low", "high")}
@@ -227,6 +239,19 @@ def cell(column: str, seeds: Sequence[dict], gait: Gait) -> dict | None:
         "high": interval.high,
         "seeds": values,
     }
+
+
+def survived(seeds: Sequence[dict]) -> dict:
+    """Of all long rollouts of some trainings, taken together, those that are alive at the end."""
+    lasted = np.concatenate([its["seconds until failure"] for its in seeds])
+    curve = metrics.survival(lasted, seeds[0]["seconds each"])
+    return {
+        "value": float(np.isinf(lasted).mean()),
+        "low": float(curve.low[-1]), "high": float(curve.high[-1]),
+        "seeds": [its["alive"]["value"] for its in seeds], "rollouts": len(lasted),
+        "failed": {kind: sum(its["failed"][kind] for its in seeds) for kind in seeds[0]["failed"]},
+        "median seconds until failure": float(np.median(lasted.clip(max=seeds[0]["seconds each"]))),
+    }  # fmt: skip
 
 
 def starts_of(column: str, its: dict) -> list[float]:
@@ -285,7 +310,8 @@ def compared(rows: dict[str, dict], floor: dict[str, dict]) -> dict:
         for gait, real in floor.items():
             its[gait] = {}
             for column in COLUMNS:
-                us, them = (rows[t]["gaits"][gait].get(column.name) for t in (ours, theirs))
+                cells = [rows[t]["gaits"][gait].get(column.name) for t in (ours, theirs)]
+                us, them = (one or {"seeds": []} for one in cells)
                 wished = real[column.name]["value"]
                 off = lambda one, c=column, w=wished: [columns.off(c, v, w) for v in one["seeds"]]
                 least = (
