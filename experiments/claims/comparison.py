@@ -42,7 +42,12 @@ def w9(limits: dict, found: dict) -> Verdict:
 
 
 def order_of(pair: dict) -> str:
-    """Of a difference in distance from real, second minus first, with its interval: who is nearer?"""
+    """Of a difference in distance from real, second minus first, with its interval: who is nearer?
+
+    An end that is no number decides nothing.
+    """
+    if pair["low"] is None or pair["high"] is None:
+        return "undecided"
     if pair["low"] > 0:
         return "as people"
     return "the other way" if pair["high"] < 0 else "undecided"

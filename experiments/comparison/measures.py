@@ -103,9 +103,11 @@ def variety(go_on: GoOn, real: Real, gait: Gait, count: int = SAMPLES) -> dict:
 
 
 def spread(values: np.ndarray) -> np.ndarray:
-    """From the 10 % to the 90 % quantile of each quantity (motions, quantities)."""
-    low, high = np.nanquantile(values, [0.1, 0.9], axis=0)
-    return high - low
+    """From the 10 % to the 90 % quantile of each quantity (motions, quantities), NaN left out; NaN if all
+    are: who takes no step has no length of step."""
+    columns = [column[~np.isnan(column)] for column in values.T]
+    ends = [np.quantile(some, [0.1, 0.9]) if len(some) else (np.nan, np.nan) for some in columns]
+    return np.array([high - low for low, high in ends])
 
 
 def asked(gait: Gait, learned: Sequence[Tensor], made: Sequence[Tensor], seed: int) -> list[float]:

@@ -226,19 +226,23 @@ def cell(column: str, seeds: Sequence[dict], gait: Gait) -> dict | None:
         return survived([its[ALIVE] for its in seeds])
     if column == FRECHET:
         each = [metrics.jackknife(its["moments"], gait.frechet.distance)._asdict() for its in seeds]
-        mean = {end: float(np.mean([its[end] for its in each])) for end in ("value", "low", "high")}
-        return mean | {"seeds": [its["value"] for its in each]}
+        ends = {end: float(np.mean([its[end] for its in each])) for end in ("value", "low", "high")}
+        return ends | {"seeds": [its["value"] for its in each]}
     by_start = [starts_of(column, its) for its in seeds]
-    values = [float(np.nanmean(one)) for one in by_start]
+    values = [mean(one) for one in by_start]
     if len({len(one) for one in by_start}) == 1:
-        by_start = [np.nanmean(by_start, axis=0)]
-    interval = metrics.bootstrap(np.concatenate(by_start))
-    return {
-        "value": float(np.mean(values)),
-        "low": interval.low,
-        "high": interval.high,
-        "seeds": values,
-    }
+        by_start = [[mean(start) for start in zip(*by_start, strict=True)]]
+    each = np.concatenate(by_start)
+    if np.isnan(each).all():  # feet that never rest have no skate
+        return None
+    interval = metrics.bootstrap(each)
+    return {"value": mean(values), "low": interval.low, "high": interval.high, "seeds": values}
+
+
+def mean(values: Sequence[float]) -> float:
+    """NaN left out; NaN of nothing."""
+    defined = [value for value in values if not np.isnan(value)]
+    return float(np.mean(defined)) if defined else float("nan")
 
 
 def survived(seeds: Sequence[dict]) -> dict:
