@@ -21,22 +21,20 @@ REFERENCE = "RNN, as it ships"
 
 
 def ratios(
-    methods: Sequence[Method], begun: Begun, counts: Sequence[int] = CHARACTERS, turns: int = TURNS
-) -> dict[str, dict[str, float | None]]:
-    """Of each method its frames a second over the reference's, by number of characters.
+    method: Method, reference: Method, begun: Begun, counts: Sequence[int] = CHARACTERS
+) -> dict[str, float | None]:
+    """A method's frames a second over the reference's, by number of characters.
 
-    None where a method is too dear. The reference is the method of that title.
+    None where it is too dear.
     """
-    reference = next(method for method in methods if method.title == REFERENCE)
-    found: dict[str, dict] = {method.title: {} for method in methods}
+    found: dict[str, float | None] = {}
     for count in counts:
+        if str(count) in method.without:
+            found[str(count)] = None
+            continue
         many = begun[torch.arange(count) % len(begun)]
-        for method in methods:
-            if str(count) in method.without:
-                found[method.title][str(count)] = None
-                continue
-            each = [seconds(reference, many) / seconds(method, many) for _ in range(turns)]
-            found[method.title][str(count)] = statistics.median(each)
+        each = [seconds(reference, many) / seconds(method, many) for _ in range(TURNS)]
+        found[str(count)] = statistics.median(each)
     return found
 
 

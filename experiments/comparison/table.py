@@ -170,7 +170,12 @@ def told(each: Sequence[Method], found: dict, real: Real, gaits: dict[str, Gait]
     for method in each:
         rows.setdefault(method.title, []).append(method)
     firsts = [its[0] for its in rows.values()]
-    ratios = speed.ratios(firsts, gaits["walk"].begun["test"])
+    reference = next(method for method in firsts if method.title == speed.REFERENCE)
+    ratios = {
+        method.title: kept(method, "speed", lambda method=method: speed.ratios(
+            method, reference, gaits["walk"].begun["test"]))
+        for method in firsts
+    }  # fmt: skip
     floor = {name: floor_of(gait) for name, gait in gaits.items()}
     told_rows = {
         title: about(its, found) | {"frames a second, over the reference's": ratios[title], "gaits": {

@@ -78,7 +78,8 @@ def test_order_of_methods_that_slide_more_and_more(walks):
 def test_speed_is_a_ratio_to_the_reference_and_none_where_it_is_too_dear(begun, monkeypatch):
     cost = {speed.REFERENCE: 2.0, "slow": 8.0}
     monkeypatch.setattr(speed, "seconds", lambda method, many: cost[method.title] * len(many))
-    names = [("RNN", "as it ships", {}), ("slow", "nobody trained it", {"256": "dear"})]
-    methods = [Method(name, kind, "", None, without=without) for name, kind, without in names]
-    found = speed.ratios(methods, begun)
-    assert found == {speed.REFERENCE: {"1": 1.0, "256": 1.0}, "slow": {"1": 0.25, "256": None}}
+    row = lambda name, kind, **more: Method(name, kind, "", None, **more)
+    reference = row("RNN", "as it ships")
+    slow = row("slow", "nobody trained it", without={"256": "too dear"})
+    assert speed.ratios(reference, reference, begun) == {"1": 1.0, "256": 1.0}
+    assert speed.ratios(slow, reference, begun) == {"1": 0.25, "256": None}

@@ -45,7 +45,6 @@ def small(data, tmp_path, monkeypatch):
     monkeypatch.setattr(Prepared, "find", lambda name: data)
     monkeypatch.setattr(judging, "UPDATES", 2)
     monkeypatch.setattr(columns, "CRITICS", 1)
-    monkeypatch.setattr(speed, "CHARACTERS", (1, 2))
     monkeypatch.setattr(speed, "seconds", lambda method, many: float(len(many)))
     lasting, variety = measures.lasting, measures.variety
     monkeypatch.setattr(measures, "lasting", lambda *its: lasting(*its, frames=60))
