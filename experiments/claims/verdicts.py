@@ -2,7 +2,7 @@
 
     python -m experiments.claims.verdicts [ID ...]
 
-One function a claim, in rnn_gan.py, denoising.py, aclstm.py and strnn.py: it takes the claim's limits and its results, and
+One function a claim, in rnn_gan.py, denoising.py, aclstm.py, strnn.py and comparison.py: it takes the claim's limits and its results, and
 returns the verdict and the numbers that decided it. A result that is not there gives "open".
 """
 
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import yaml
 
-from . import aclstm, denoising, rnn_gan, strnn
+from . import aclstm, comparison, denoising, rnn_gan, strnn
 from .verdict import NOT, OPEN, UNTESTABLE, VERDICTS, Absent, Verdict
 
 __all__ = [
@@ -23,7 +23,7 @@ __all__ = [
 ]  # fmt: skip
 
 ROOT = Path(__file__).resolve().parents[2]
-RULES = rnn_gan.RULES | denoising.RULES | aclstm.RULES | strnn.RULES
+RULES = rnn_gan.RULES | denoising.RULES | aclstm.RULES | strnn.RULES | comparison.RULES
 
 
 def claims() -> list[dict]:

@@ -141,9 +141,7 @@ def variety(
                 within = (least <= found[-1]) & (found[-1] <= most) | np.isnan(found[-1])
                 sound += not failed and bool(within.all())
         groups = [np.array(v) for key, v in real.items() if key[1].startswith(actions)]
-        again = [
-            (g - np.nanmean(g, 0)) * (len(g) / (len(g) - 1)) ** 0.5 for g in groups if len(g) >= 3
-        ]
+        again = same_again(groups)
         result[gait] = {
             "start": name, "start's speed (m/s)": speed, "samples": samples,
             "sound": sound / samples, "clips": sum(map(len, again)), "groups": len(again),
@@ -160,6 +158,11 @@ def variety(
             ],
         }  # fmt: skip
     return result
+
+
+def same_again(groups: list[np.ndarray]) -> list[np.ndarray]:
+    """How quantities (clips, quantities) of people who do one thing again are off their mean."""
+    return [(g - np.nanmean(g, 0)) * (len(g) / (len(g) - 1)) ** 0.5 for g in groups if len(g) >= 3]
 
 
 def over_people(variety: dict[str, dict]) -> dict[str, float]:

@@ -18,7 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from .. import metrics
-from ..encodings import JointAngles, from_config
+from ..encodings import Encoding, from_config
 from ..errors import TrainingError
 from ..feet import contacts
 from ..models import Discriminator
@@ -47,7 +47,7 @@ class Told(NamedTuple):
 
 
 def critic(
-    encoding: JointAngles,
+    encoding: Encoding,
     training: tuple[Sequence[Tensor], Sequence[Tensor]],
     asked: tuple[Sequence[Tensor], Sequence[Tensor]],
     seed: int = 0,
@@ -60,6 +60,7 @@ def critic(
 
     Parameters
     ----------
+    encoding : of the clips; of its features the critic sees end effectors.
     training : real and made clips (frames, dim) that it learns from, a second or longer.
     asked : real and made clips that it is asked about.
 
@@ -68,7 +69,8 @@ def critic(
     TrainingError : no clip is as long as a second.
     """
     frames = round(PIECE * encoding.fps)
-    encoding = from_config(encoding.config() | {"contacts": False})
+    if "contacts" in encoding.slices:
+        encoding = from_config(encoding.config() | {"contacts": False})
     training, asked = (
         [[clip[:, : encoding.dim] for clip in clips] for clips in both]
         for both in (training, asked)

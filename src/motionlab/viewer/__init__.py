@@ -15,6 +15,7 @@ from .pictures import palette
 # Drawn by libraries that take their time to load: imported when first used.
 _LATER = {
     **dict.fromkeys(("still", "filmstrip", "stack", "video"), ".pictures.stills"),
+    "method_table": ".pictures.method_table",
     "scene": ".live.scene3d",
     "diagram": ".pictures.diagram",
 }
@@ -27,6 +28,7 @@ __all__ = [
     "feeding",
     "filmstrip",
     "knobs",
+    "method_table",
     "palette",
     "plots",
     "pose_map",

@@ -1,0 +1,1 @@
+"""All methods of the three papers on one table: the same body, data, starts and measures."""
