@@ -37,7 +37,9 @@ def test_wheel_holds_the_player_and_the_tables(tmp_path):
     assert run.returncode == 0, run.stdout + run.stderr
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as files:
-        assert "motionlab/py.typed" in files.namelist()  # its types are for others, too; it is empty
+        assert (
+            "motionlab/py.typed" in files.namelist()
+        )  # its types are for others, too; it is empty
         names = {info.filename for info in files.infolist() if info.file_size}
     modules = {p.relative_to(ROOT / "src").as_posix() for p in (ROOT / "src").rglob("*.py")}
     assert names >= READ_WHEN_IT_RUNS | modules
