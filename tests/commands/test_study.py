@@ -28,7 +28,7 @@ def test_a_study_from_clips_to_a_report(clips, capsys):
     pytest.importorskip("statsmodels")
     assert main(["study", "build", "clips", "--out", "study.html"]) == 0
     said = capsys.readouterr().out
-    assert "10 items, 2 methods (RNN, mocap), gaits: run, walk" in said
+    assert "10 items (2 of them checks), 2 methods (RNN, mocap), gaits: run, walk" in said
     assert "note: 2 clips of each method in each gait, not 7" in said
     assert "study.json: the key" in said
     assert main(["study", "simulate", "study.json", "--out", "answers", "--raters", "8"]) == 0
@@ -64,7 +64,7 @@ def test_people_are_asked_for_and_there_are_none(clips, capsys):
 def test_files_and_folders_are_methods(clips, capsys):
     command = ["study", "build", "clips/mocap/walk", "clips/RNN/walk/0.bvh", "--design", "pairs"]
     assert main([*command, "--out", "two.html"]) == 0
-    assert "3 items, 2 methods (0, walk), gaits: all" in capsys.readouterr().out
+    assert "3 items (2 of them checks), 2 methods (0, walk), gaits: all" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

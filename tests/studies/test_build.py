@@ -106,7 +106,17 @@ def test_other_bodies_are_told():
     skeleton = other.motion.skeleton
     taller = replace(skeleton, offsets=1.1 * skeleton.offsets)
     made = build([source(), replace(other, motion=replace(other.motion, skeleton=taller))])
-    assert any("2 different bodies" in note for note in made.notes)
+    assert any("2 different bodies, and not the same" in note for note in made.notes)
+
+
+def test_bodies_that_each_method_has_tell_nothing():
+    bodies = [source(method=method) for method in "AABB"]
+    for k in (1, 3):
+        motion = bodies[k].motion
+        taller = replace(motion.skeleton, offsets=1.1 * motion.skeleton.offsets)
+        bodies[k] = replace(bodies[k], motion=replace(motion, skeleton=taller), file=f"tall {k}")
+    made = build(bodies)
+    assert not any("bodies" in note for note in made.notes)
 
 
 def test_one_motion_is_a_study_that_says_what_it_cant_tell():

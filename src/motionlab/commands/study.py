@@ -83,8 +83,9 @@ class Build(Taken):
         page, study = study_page(made, reveal=self.reveal), made.study
         _write(key, study.to_json())
         _write(self.out, page)
+        checks = sum(item.asks is not None for item in study.items)
         print(
-            f"{self.out}: {len(study.items)} items, {len(study.methods)} methods "
+            f"{self.out}: {len(study.items)} items ({checks} of them checks), {len(study.methods)} methods "
             f"({', '.join(study.methods)}), gaits: {', '.join(study.gaits)}; {study.seconds:g} s each, "
             f"{study.fps:g} fps, {len(study.orders)} orders, {len(page) / 1e6:.1f} MB; give it to raters"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -184,13 +184,22 @@ def _alike(drawn: list[Source], seconds: float | None, notes: list[str]) -> list
             f"lengths differ ({min(lengths):.2f} to {max(lengths):.2f} s), so that all were cut to the "
             f"first {frames / fps:.2f} s."
         )
-    bodies = {tuple(s.motion.skeleton.offsets.flatten().round(decimals=3).tolist()) for s in drawn}
-    if len(bodies) > 1:
+    if bodies := _telling(drawn):
         notes.append(
-            f"{len(bodies)} different bodies: raters may tell methods by them; `motionlab retarget` "
-            "brings all to one."
+            f"{bodies} different bodies, and not the same ones in each method: raters may tell methods by "
+            "them; `motionlab retarget` brings all to one."
         )
     return [replace(s, motion=s.motion[:frames]) for s in drawn]
+
+
+def _telling(drawn: Iterable[Source]) -> int:
+    """How many bodies there are, if a method can be told by its bodies; else 0."""
+    of_method: dict[str, set] = {}
+    for source in drawn:
+        body = tuple(source.motion.skeleton.offsets.flatten().round(decimals=3).tolist())
+        of_method.setdefault(source.method, set()).add(body)
+    told = any(its != next(iter(of_method.values())) for its in of_method.values())
+    return len(set().union(*of_method.values())) if told else 0
 
 
 def _on_floor(motion: Motion) -> Motion:
