@@ -26,7 +26,7 @@ _STYLE = """<style>
 .curve .low { align-self: end; } .curve .high, .curve .low { text-align: right; min-width: 3.2rem; }
 .curve .time { grid-column: 2; display: flex; justify-content: space-between; }
 .curve polyline, .curve line { fill: none; stroke-width: 1.5; vector-effect: non-scaling-stroke; }
-.curve .wild { stroke: #c00000; stroke-width: 2; }
+.curve .wild { stroke: #e0483e; stroke-width: 2; }
 ul.said { margin: 0.5rem 0; padding-left: 1.2rem; }
 .before { stroke: #c26a00; } .after { stroke: #1f77d0; }
 .key { display: inline-block; width: 1.2em; border-top: 3px solid; vertical-align: middle; }
@@ -159,6 +159,7 @@ def _picture(lines: list[tuple[str, Tensor]], fps: float, unit: str, others: Ten
     return (
         f'<div class="curve"><span class="high">{high:.0f} {unit}</span>'
         f'<span class="low">{low:.0f} {unit}</span>'
-        f'<svg viewBox="0 0 {WIDE} {HIGH}" preserveAspectRatio="none" role="img">{drawn}</svg>'
+        f'<svg viewBox="0 0 {WIDE} {HIGH}" preserveAspectRatio="none" role="img" '
+        f'aria-label="from {low:.0f} to {high:.0f} {unit}, over time">{drawn}</svg>'
         f'<span class="time"><span>0 s</span><span>{(frames - 1) / fps:.1f} s</span></span></div>'
     )
