@@ -57,7 +57,9 @@ def vendor() -> None:
             sys.exit("npm could not fetch the pages' scripts: the first build needs the network.")
         shutil.copyfile(lock, fetched)
     shutil.rmtree(VENDOR, ignore_errors=True)
-    icons = {f"{WIDGETS}/{f.name}": f for f in (modules / WIDGETS).glob("*.woff2")}
+    icons = list((modules / WIDGETS).glob("*.woff2"))
+    # The manager has two style sheets, which look for them in different folders.
+    icons = {f"{folder}/{f.name}": f for folder in (WIDGETS, WIDGETS.split("/")[0]) for f in icons}
     for name, source in (VENDORED | icons).items():
         (VENDOR / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(modules / source, VENDOR / name)
