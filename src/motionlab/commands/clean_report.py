@@ -14,10 +14,8 @@ from torch import Tensor
 from ..motion import Motion
 
 WORST = 4  # joints whose curves are drawn
-WIDE, HIGH = (
-    600,
-    90,
-)  # of a picture, in its own units; it is stretched to the page, its words are not
+# Of a picture, in its own units; it is stretched to the page, its words are not.
+WIDE, HIGH = 600, 90
 MOST = 1200  # points of a line: a screen has no more
 _STYLE = """<style>
 .curve { display: grid; grid-template-columns: auto 1fr; gap: 0 0.4rem; font-size: 0.75rem; margin: 0.2rem 0 1rem; }

@@ -256,9 +256,8 @@ def _bent(
             lower: product(shortest_turn(shin_was, shin), world[..., lower, :, :]),
             foot: world[..., foot, :, :],
         }
-        if (
-            foot != toes < skeleton.joints and toe_heights is not None
-        ):  # a joint, not the end of the foot
+        a_joint = foot != toes < skeleton.joints  # not the end of the foot
+        if a_joint and toe_heights is not None:
             turned[toes] = _toes_up(skeleton, toes, world, toe_heights[..., i])
         for joint, whole in turned.items():
             above = _carried(skeleton, skeleton.parents[joint], turned, world)
