@@ -14,6 +14,7 @@ player and the first scene of a page are enough. It waits as long as a busy mach
 
 import functools
 import io
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -40,15 +41,12 @@ FLAGS = [  # WebGL in software: the machine that checks may have no graphics car
 ]
 PLAYER, SCENE, DREAM = ".motionlab-player", ".motionlab-scene iframe", ".motionlab-dream"
 PATH = ".motionlab-path"
-STROKE = (
-    (0.25, 0.75),
-    (0.35, 0.3),
-    (0.6, 0.6),
-    (0.75, 0.25),
-)  # shares of a board's width and height
+# shares of a board's width and height
+STROKE = ((0.25, 0.75), (0.35, 0.3), (0.6, 0.6), (0.75, 0.25))
 WEIGHTS_BYTES = 8e6  # of a network that a page loads on a click
 STEP = 1000 / 30  # milliseconds that a network may take for a frame
 EACH = 1000  # figure of a page; more than any has
+SENDS_ON = re.compile(r'<meta http-equiv="Refresh" content="0; url=([^"]+)"')
 CONTRAST = 40  # of 255 levels of grey: less between the darkest and the lightest is nothing drawn
 
 
@@ -343,6 +341,9 @@ def check(folder: Path, served: bool = True, at_once: int = 1) -> list[str]:
     at_once : browsers that share the pages.
     """
     pages = sorted(p for p in folder.rglob("*.html") if "_static" not in p.parts)
+    troubles = [line for p in pages if (line := leads_nowhere(p, folder))]
+    # Who visits a page that sends on would look at the next one before it is whole.
+    pages = [p for p in pages if not SENDS_ON.search(p.read_text(encoding="utf-8"))]
     with local_server(folder) as server:
         bases = (folder.as_uri() + "/", server)[: 1 + served]
         tasks = []
@@ -352,10 +353,19 @@ def check(folder: Path, served: bool = True, at_once: int = 1) -> list[str]:
             opened = [p for p in pages if listings or "_modules" not in p.parts]
             tasks += [(folder, base, size, opened[i::at_once], not i) for i in range(at_once)]
         if at_once == 1:
-            return [trouble for task in tasks for trouble in check_pages(*task)]
+            return troubles + [trouble for task in tasks for trouble in check_pages(*task)]
         with ProcessPoolExecutor(at_once) as pool:
             waiting = [pool.submit(check_pages, *task) for task in tasks]
-            return [trouble for task in waiting for trouble in task.result()]
+            return troubles + [trouble for task in waiting for trouble in task.result()]
+
+
+def leads_nowhere(path: Path, folder: Path) -> str | None:
+    """A line if this page only sends on, to a page that there is not."""
+    found = SENDS_ON.search(path.read_text(encoding="utf-8"))
+    lost = found and not (path.parent / found[1]).is_file()
+    return (
+        f"{path.relative_to(folder)}: sends on to {found[1]}, which there is not" if lost else None
+    )
 
 
 def check_pages(

@@ -67,6 +67,7 @@ FAULTS = {
 }
 SEARCH = '<ul id="search-results"><li><a href="index.html">found</a></li></ul>'
 GOOD = {"index": "<p>fine</p>", "search": SEARCH}
+AWAY = '<meta http-equiv="Refresh" content="0; url={}.html" />'
 
 
 def write(folder, pages):
@@ -85,7 +86,8 @@ def troubles(tmp_path_factory):
     except SystemExit as missing:
         pytest.skip(str(missing))
     folder = tmp_path_factory.mktemp("book")
-    write(folder, {f"fault{i}": body for i, body in enumerate(FAULTS.values())} | GOOD)
+    away = {"away": AWAY.format("index"), "lost": AWAY.format("nowhere")}
+    write(folder, {f"fault{i}": body for i, body in enumerate(FAULTS.values())} | away | GOOD)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(check_book, "PATIENCE", 1_000)  # nothing here will ever appear
         return check_book.check(folder, served=False)
@@ -104,3 +106,9 @@ def test_good_pages_pass(troubles, tmp_path):
     assert not [line for line in troubles if "index.html" in line or "search" in line]
     write(tmp_path, GOOD)
     assert check_book.check(tmp_path, at_once=2) == []
+
+
+def test_a_page_that_sends_on_is_checked_where_it_leads(troubles):
+    assert [line for line in troubles if "away" in line or "lost" in line] == [
+        "lost.html: sends on to nowhere.html, which there is not"
+    ]
