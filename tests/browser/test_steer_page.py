@@ -77,6 +77,46 @@ def test_pictures_that_come_late_are_told(visit):
     assert "late" not in told[2]
 
 
+def test_a_delay_lets_him_hear_late(visit):
+    """What is asked is heard so many frames later, what was asked meanwhile in its order."""
+    page = visit().page
+    canvas = load(page)
+    page.get_by_label("Delay (s)").first.fill("0.5")
+    canvas.focus()
+    page.evaluate(
+        """() => {
+          const { steered, player, commands } = document.querySelector("figure").motionlab;
+          const [asked, steer] = [commands.asked.bind(commands), steered.steer.bind(steered)];
+          const note = (list, wish) => {
+            const way = wish.speed ? Math.round(wish.direction * 180 / Math.PI) : "stand";
+            if (list.at(-1)?.[0] !== way) list.push([way, player.clock.time]);
+            return wish;
+          };
+          Object.assign(window, { said: [], heard: [] });
+          commands.asked = (view) => note(said, asked(view));
+          steered.steer = (wish) => steer(note(heard, wish));
+        }"""
+    )
+    frames_pass(page, SECOND)
+    page.keyboard.down("ArrowUp")
+    frames_pass(page, 8)
+    page.keyboard.down("ArrowLeft")
+    frames_pass(page, 8)
+    page.keyboard.up("ArrowUp")
+    page.keyboard.up("ArrowLeft")
+    frames_pass(page, SECOND)
+    said, heard = page.evaluate("[said, heard]")
+    ways = [way for way, _ in said]
+    assert ways[:3] == ["stand", 0, 45] and ways[-1] == "stand"
+    assert [way for way, _ in heard] == ways
+    late = [after - before for (_, before), (_, after) in zip(said[1:], heard[1:], strict=True)]
+    assert all(15 <= frames < 15 + SECOND for frames in late), late
+    assert min(late) < 18  # the next picture
+    page.locator("p[role=status]").filter(has_text="seen after 0.").wait_for(timeout=PATIENCE)
+    least = page.locator("p[role=status]").inner_text().split("after ")[1].split(" ")[0]
+    assert float(least) == pytest.approx(0.5 + value(page, "steered.latency[0]"), abs=0.01)
+
+
 def test_shift_runs(visit):
     page = visit("shipped.html").page
     load(page)

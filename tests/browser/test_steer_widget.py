@@ -67,6 +67,20 @@ def test_a_kernel_is_asked_window_by_window(kernel_page):
     assert made.live[0].how.weights == {"resting": 0.0}
 
 
+def test_a_kernel_hears_late_by_the_delay(kernel_page):
+    page, answer, _made = kernel_page
+    assert answer()["do"] == "begin"
+    page.get_by_label("Delay (s)").first.fill("1")
+    page.locator("canvas").focus()
+    page.keyboard.down("ArrowLeft")
+    begun = page.evaluate("figure.player.clock.time")
+    heard = [(answer()["wish"].get("speed", 0), page.evaluate("figure.player.clock.time"))]
+    while not heard[-1][0] and heard[-1][1] < begun + 90:
+        heard.append((answer()["wish"].get("speed", 0), page.evaluate("figure.player.clock.time")))
+    assert heard[-1][0] == 1.2 and heard[-1][1] >= begun + 30
+    assert len(heard) > 4
+
+
 def test_a_kernel_begins_again_and_says_what_went_wrong(kernel_page):
     page, answer, made = kernel_page
     answer()

@@ -107,9 +107,9 @@ export class KernelSource {
   }
 
   /** `pace` as of a PageSource. */
-  cost({ cost, fps, latency }, pace) {
+  cost({ cost, fps, latency, settings }, pace) {
     if (this.failed) return this.failed;
-    const [least, most] = latency.map((seconds) => seconds.toFixed(2));
+    const [least, most] = latency.map((seconds) => (seconds + settings.delay).toFixed(2));
     const made = Math.round(1000 / Math.max(cost, 1e-3));
     const slow = made < fps ? " Time passes slower." : late(pace);
     return `The kernel makes ${made} frames a second; ${fps} are needed. A wish is seen after ${least} to ${most} s.${slow}`;

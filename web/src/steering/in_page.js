@@ -23,10 +23,10 @@ export class PageSource {
   }
 
   /** `pace`: of time as it is seen, 1 where pictures come in time. */
-  cost({ cost, fps, cast, latency }, pace) {
+  cost({ cost, fps, cast, latency, settings }, pace) {
     const much = cost > (SHARE * 1000) / fps;
     const slow = much ? " That is too much for this machine, and time passes slower" + (cast[0].futures ? "." : ": take fewer futures.") : late(pace);
-    const [least, most] = latency.map((seconds) => seconds.toFixed(2));
+    const [least, most] = latency.map((seconds) => (seconds + settings.delay).toFixed(2));
     return `Runs here, in this page: ${cost.toFixed(1)} ms for a frame. A wish is seen after ${least} to ${most} s.${slow}`;
   }
 }

@@ -4,6 +4,7 @@ import { LivePlayer } from "../network/live_player.js";
 import { TWIST } from "../player.js";
 import { Arrows } from "./arrows.js";
 import { steers } from "./commands.js";
+import { Delayed } from "./delayed.js";
 import { giveBack, takes } from "./focus.js";
 import { Pace } from "./pace.js";
 import { Stick } from "./stick.js";
@@ -15,7 +16,7 @@ export class SteerPlayer extends LivePlayer {
   /** `payload`: height, floor, trail, autoplay, kept (seconds); `steered`: Steered, or what a kernel steers. */
   constructor(host, payload, still, steered, commands) {
     super(host, payload, still, steered);
-    Object.assign(this, { steered, commands, passes: new Pace() });
+    Object.assign(this, { steered, commands, delayed: new Delayed(), passes: new Pace() });
     this.canvas.setAttribute("role", "application");
     this.canvas.setAttribute("aria-roledescription", "steered character");
     this.canvas.setAttribute("aria-label", "A character who is steered: hold arrow keys, or W, A, S and D, to go that way as you see it, with "
@@ -94,7 +95,8 @@ export class SteerPlayer extends LivePlayer {
     const now = performance.now();
     const before = this.clock.time;
     this.commands.poll();
-    this.steered.steer(this.commands.asked(this.facing));
+    const heard = this.delayed.hear(before, this.commands.asked(this.facing), this.commands.settings.delay * this.steered.fps);
+    if (heard) this.steered.steer(heard);
     super.tick(seconds);
     if (this.playing) this.passes.picture(now, (this.clock.time - before) / (this.clock.fps * this.clock.speed));
     else this.passes.rest();

@@ -25,6 +25,8 @@ DIRECTION = Control("direction", "Direction (°)", "The way that is asked: 0 is 
                     "view begins, 90 to its left", -180, 180, 5, 0)  # fmt: skip
 ONWARD = Control("onward", "Keep going", "Without a key he goes on in the direction above, instead "
                  "of standing", 0, 1, 1, 0)  # fmt: skip
+DELAY = Control("delay", "Delay (s)", "So much later is all heard that keys, stick, sliders or lines "
+                "ask for, as over a slow line", 0, 1, 0.05, 0)  # fmt: skip
 HELP = Control("help", "Help", "Off: nothing is asked of the network, and it wanders", 0, 1, 1, 1)
 PUSH = Control("push", "Push", "How strongly each step is pushed to what is asked", 0, 1.5, 0.05, 1)
 FUTURES = Control("futures", "Futures (K)", "As many samples of the next five frames, of which the "
@@ -89,7 +91,7 @@ def controls_of(model: nn.Module, look: Look, refiner: nn.Module | None) -> list
         "start": start_of(model),
     }
     chance = [TEMPERATURE, *(_KNOWN[name] for name in ("memory", "start", "seed"))]
-    some = [SPEED, DIRECTION, ONWARD, HELP, PUSH, FUTURES, *chance]
+    some = [SPEED, DIRECTION, ONWARD, DELAY, HELP, PUSH, FUTURES, *chance]
     if refiner is not None:
         some.append(REFINED)
     if lock_of(model) is not None:
