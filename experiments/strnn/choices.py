@@ -36,6 +36,7 @@ from .other_decoders import AttentiveStrnn, GruStrnn
 
 FOLDER = Path("runs/strnn_choices")
 PLAIN = "Temporal_20_20_MSE"
+WINDOW = 20  # frames that all rows read, and foretell
 SEEDS = 2  # what 40 minutes of a shared core hold
 ROWS = (
     Row("GRU", "GRU cells instead of LSTM cells"),
@@ -43,8 +44,8 @@ ROWS = (
     Row("angles", "frames are joint angles, not positions"),
 )
 KINDS = {"GRU": GruStrnn, "attention": AttentiveStrnn}
-# sources; of the first prefix of each, poses are kept to look at
-LOOKED_AT = {"walk": "bandai-locomotion", "dance": "aclstm-cmu"}
+# words in names; of the first prefix from such a clip poses are kept to look at
+LOOKED_AT = {"walk": "_walk_", "dance": "salsa"}
 
 
 @dataclass(frozen=True)
@@ -132,23 +133,24 @@ def judged(runs: Sequence[Run], angles: Prepared, body: Prepared, split: str) ->
     clips, real = body.clips(split), extrapolation.real_of(body)
     kinds = extrapolation._sources(clips, body)
     places = {clip.data_ptr(): i for i, clip in enumerate(clips)}
-    chosen = extrapolation.long_clips(clips, kinds, STARTS, 20 + 20)  # as in the ablations
+    chosen = extrapolation.long_clips(clips, kinds, STARTS, 2 * WINDOW)  # as in the ablations
     which = [places[clip.data_ptr()] for clip in chosen]
     starts = [len(clip) // 2 for clip in chosen]
-    looked_at = {name: [kinds[i] for i in which].index(source) for name, source in LOOKED_AT.items()
-                 if source in [kinds[i] for i in which]}  # fmt: skip
+    named = [name for name, its in zip(body.names, body.splits, strict=True) if its == split]
+    looked_at = first_of([named[i] for i in which])
     rows: dict[str, dict] = {}
     for run in runs:
         data = rows_for(run, angles, body)
         model, own = trained(run, data), data.clips(split)
-        seeds = torch.stack([own[i][at - 20 : at] for i, at in zip(which, starts, strict=True)])
+        seeds = torch.stack([own[i][at - WINDOW : at] for i, at in zip(which, starts, strict=True)])
         made = in_body(model.extrapolate(seeds, FRAMES), data.encoding, body.encoding)
         weights = sum(its.numel() for its in model.parameters())
         row = rows.setdefault(run.row.name, {"what": run.row.what, "weights": weights, "seeds": {}})
         if run.seed == 0:
             row["poses (m)"] = {name: poses(made[i], body) for name, i in looked_at.items()}
         row["seeds"][str(run.seed)] = (
-            of_rollouts(made, clips, body, real) | of_windows(model, own, clips, body)
+            of_rollouts(made, clips, body, real, data is body)
+            | of_windows(model, own, clips, body)
         ) | {
             "updates": run.made, "seconds of training": run.curve[-1]["seconds"],
             "loss in training": run.curve[-1]["train"], "validation": run.validation,
@@ -157,12 +159,18 @@ def judged(runs: Sequence[Run], angles: Prepared, body: Prepared, split: str) ->
     follows = [clip[at:][:FRAMES] for clip, at in zip(chosen, starts, strict=True)]
     return {
         "rows": rows,
-        "real": of_real([clip for clip in follows if len(clip) >= 40], body, real),
+        "real": of_real([clip for clip in follows if len(clip) >= 2 * WINDOW], body, real),
         "pairs": {
             f"{PLAIN} < {row.name}": compared(rows[PLAIN], rows[row.name], row.name)
             for row in ROWS if {row.name, PLAIN} <= rows.keys()
         },
     }  # fmt: skip
+
+
+def first_of(names: Sequence[str]) -> dict[str, int]:
+    """Which of some clips are looked at."""
+    each = {kind: [word in name for name in names] for kind, word in LOOKED_AT.items()}
+    return {kind: its.index(True) for kind, its in each.items() if any(its)}
 
 
 def in_body(features: Tensor, encoding: Encoding, body: BodyFrame) -> Tensor:
@@ -180,16 +188,20 @@ def without_contacts(features: Tensor, body: Prepared) -> Tensor:
 
 
 def of_rollouts(
-    made: Tensor, clips: Sequence[Tensor], body: Prepared, real: extrapolation.Real
-) -> dict:
-    """Of rows (starts, frames, dim): nearness to real motion, with and without contacts, and liveliness."""
-    fps, long = body.encoding.fps, [clip[:FRAMES] for clip in clips if len(clip) >= 40]
+    made: Tensor, clips: Sequence[Tensor], body: Prepared, real: extrapolation.Real,
+    contacts: bool = True,
+) -> dict:  # fmt: skip
+    """Of rows (starts, frames, dim): nearness to real motion, with and without contacts, and liveliness.
+
+    contacts : False: not all four are said, so that there is no distance with them.
+    """
+    fps, long = body.encoding.fps, [clip[:FRAMES] for clip in clips if len(clip) >= 2 * WINDOW]
     points = [rollouts.points_of(body.encoding, some) for some in made]
     bare = [without_contacts(clip, body) for clip in long]
     distance = lambda ours, theirs: metrics.manifold_distance(ours, theirs, fps).clamp(max=FAR)
     failures = [real.judge.failures(some) for some in points]
-    return {
-        "to real": distance(body.normalizer(made), real.clips).tolist(),
+    whole = {"to real": distance(body.normalizer(made), real.clips).tolist()} if contacts else {}
+    return whole | {
         "to real, without contacts":
             distance(without_contacts(made, body), bare_of(body, real)).tolist(),
         "of real, without contacts": float(distance(bare, without_contacts(made, body)).mean()),
@@ -204,13 +216,20 @@ def bare_of(body: Prepared, real: extrapolation.Real) -> list[Tensor]:
 
 
 def lively(points: Sequence[Tensor], body: Prepared, real: extrapolation.Real) -> dict:
-    """How much joints (frames, joints, 3) move and accelerate about the root; medians over rollouts."""
+    """How much joints (frames, joints, 3) move and accelerate about the root; medians over rollouts.
+
+    Acceleration within windows leaves out the seams where a network reads anew.
+    """
     fps = body.encoding.fps
     moves = [float(extrapolation.changes(some, fps).mean()) for some in points]
-    bends = [float(metrics.acceleration(some - some[:, :1], fps)) for some in points]
+    bent = lambda some: float(metrics.acceleration(some - some[:, :1], fps))
+    bends = [bent(some) for some in points]
+    within = [statistics.fmean(bent(its) for its in some.split(WINDOW) if len(its) == WINDOW)
+              for some in points]  # fmt: skip
     return {
         "movement (m/s)": statistics.median(moves),
         "acceleration (m/s²)": statistics.median(bends),
+        "acceleration within windows (m/s²)": statistics.median(within),
         "movement over real": statistics.median(moves) / real.change,
     }
 

@@ -48,6 +48,12 @@ def test_angles_of_a_clip_are_the_positions_of_that_clip(walks):
     assert choices.in_body(far, body.encoding, body.encoding).tolist() == [[[0.0, 1000.0]]]
 
 
+def test_a_walk_and_a_dance_are_looked_at():
+    names = ["a/run_1", "a/set_walk_2", "b/salsa_15", "b/salsa_30"]
+    assert choices.first_of(names) == {"walk": 1, "dance": 2}
+    assert choices.first_of(names[:1]) == {}
+
+
 class Repeats:
     """Says what it read, and its last frame from then on; of angles or of positions."""
 
@@ -94,6 +100,14 @@ def test_jitter_accelerates_and_the_way_of_the_root_does_not(walks):
     assert (
         choices.lively(shaken, body, real)["acceleration (m/s²)"] > 2 * calm["acceleration (m/s²)"]
     )
+    jumping = [its.clone() for its in points]
+    for its in jumping:  # where a network reads anew, and nowhere else
+        for at in range(20, len(its), 20):
+            its[at:, 1:] += 0.2
+    jumps = choices.lively(jumping, body, real)
+    assert jumps["acceleration (m/s²)"] > 2 * calm["acceleration (m/s²)"]
+    within = "acceleration within windows (m/s²)"
+    assert jumps[within] == pytest.approx(calm[within], rel=1e-3)
     carried = [its + 9 * torch.linspace(0, 1, len(its))[:, None, None] ** 2 for its in points]
     assert choices.lively(carried, body, real) == pytest.approx(calm, rel=1e-3)
 
@@ -111,10 +125,11 @@ def test_rows_are_trained_kept_and_judged(walks, tmp_path, monkeypatch):
     assert model.encoding is walks.encoding
     found = choices.judged(runs, walks, body, "val")
     assert set(found["rows"]) == {choices.PLAIN, "GRU", "attention", "angles"}
-    for row in found["rows"].values():
+    for name, row in found["rows"].items():
         its = row["seeds"]["0"]
+        assert ("to real" in its) == (name != "angles")  # which says two contacts of four
         assert len(its["to real, without contacts"]) == 3 and its["updates"] == 4
-        assert all(0 < far <= ablations.FAR for far in its["to real"])
+        assert all(0 < far <= ablations.FAR for far in its["to real, without contacts"])
         assert its["joint error (cm)"]["all"] > 0 and its["loss in training"] > 0
     assert set(found["pairs"]) == {f"{choices.PLAIN} < {row.name}" for row in choices.ROWS}
     assert 0 < found["real"]["to real, without contacts"] < found["real"]["to real"]
