@@ -139,6 +139,69 @@ def s10_narrow(limits: dict, *budgets: dict) -> Verdict:
     return Verdict(REPRODUCED if wide else NOT, told)
 
 
+# -- S10: cells, attention, angles ----------------------------------------------------------------
+
+PLAIN = "Temporal_20_20_MSE"
+
+
+def _chosen(limits: dict, found: dict, name: str) -> tuple[list[tuple[dict, dict]], dict]:
+    """Trainings without a choice and with it, by seed; and how many weights and seeds they have."""
+    if found["split"] != "test" or found["preset"] != "table":
+        raise Absent("the result there is not of test clips, or of another preset than table")
+    if missing := [its for its in (PLAIN, name) if its not in found["rows"]]:
+        raise Absent(f"the result there has no {', '.join(missing)}")
+    one, other = (found["rows"][its] for its in (PLAIN, name))
+    both = [
+        (its, other["seeds"][seed]) for seed, its in one["seeds"].items() if seed in other["seeds"]
+    ]
+    if len(both) < limits["seeds"]:
+        raise Absent("the result there is of fewer seeds than the rule asks for")
+    return both, {
+        "seeds": len(both),
+        "weights": one["weights"],
+        f"weights, {name}": other["weights"],
+    }
+
+
+def _nearer_and_truer(limits: dict, found: dict, name: str, error: str) -> Verdict:
+    """Whether the row without a choice is nearer to real motion than that with it, and errs less."""
+    both, numbers = _chosen(limits, found, name)
+    pair = found["pairs"][f"{PLAIN} < {name}"]
+    ratios = [one[error]["all"] / other[error]["all"] for one, other in both]
+    numbers |= {f"nearer than {name} ({pair['found']}) by": -pair["difference"]["value"],
+                f"{error}, of that of {name}, worst seed": max(ratios),
+                **{f"movement over real, {title}": sum(its[i]["movement over real"] for its in both)
+                   / len(both) for i, title in enumerate((PLAIN, name))}}  # fmt: skip
+    good = [pair["found"] == "better", max(ratios) <= limits["less"]]
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+
+
+def s10_gru(limits: dict, found: dict) -> Verdict:
+    return _nearer_and_truer(limits, found, "GRU", "squared error")
+
+
+def s10_angles(limits: dict, found: dict) -> Verdict:
+    return _nearer_and_truer(limits, found, "angles", "joint error (cm)")
+
+
+def s10_attention(limits: dict, found: dict) -> Verdict:
+    both, numbers = _chosen(limits, found, "attention")
+    per_move = lambda its: its["acceleration (m/s²)"] / its["movement (m/s)"]
+    trained = [one["loss in training"] / other["loss in training"] for one, other in both]
+    tested = [one["squared error"]["all"] / other["squared error"]["all"] for one, other in both]
+    livelier = [other["acceleration (m/s²)"] / one["acceleration (m/s²)"] for one, other in both]
+    restless = [per_move(other) / per_move(found["real"]) for _, other in both]
+    numbers |= {
+        "loss in training, of that with attention, worst seed": max(trained),
+        "squared error, of that with attention, worst seed": max(tested),
+        "acceleration with attention over without, least of seeds": min(livelier),
+        "acceleration for a movement, over recorded, least of seeds": min(restless),
+    }
+    good = [max(*trained, *tested) <= limits["less"],
+            min(livelier) >= limits["more"] and min(restless) > 1]  # fmt: skip
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+
+
 # -- S2: seams ------------------------------------------------------------------------------------
 
 
@@ -297,5 +360,6 @@ RULES = {
     "S1": s1, "S2": s2, "S2-seams": s2_seams, "S3": s3, "S3-noise": s3_noise, "S4": s4,
     "S4-filters": s4_filters, "S5": s5, "S6": s6, "S7": s7, "S8": s8, "S9": s9,
     "S10-noise": s10_noise, "S10-narrow": s10_narrow,
-    "S10-backward": s10_backward,
+    "S10-backward": s10_backward, "S10-gru": s10_gru, "S10-attention": s10_attention,
+    "S10-angles": s10_angles,
 }  # fmt: skip
