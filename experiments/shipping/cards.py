@@ -122,8 +122,9 @@ def card(
     kind, name = type(model).__name__, about["name"]
     toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
     begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
-    best = kind in ("LstmGmm", "Strnn")  # dancers are not mirrored, and their last weights ship
-    mirrored = ", half of them mirror images" if best else ""
+    dancer = kind not in ("LstmGmm", "Strnn")  # they are not mirrored, and their last weights ship
+    mirrored = "" if dancer else ", half of them mirror images"
+    best = not dancer and not about["preset"].get("final")
     sampling = ", ".join(f"{key} {value:g}" for key, value in about["sampling"].items())
     return f"""\
 # {name}

@@ -96,6 +96,18 @@ def test_each_stage_learns_what_it_is_for_and_goes_on(gaits, train, tmp_path, mo
         check_generates(model, "strnn")
 
 
+def test_the_last_weights_are_kept_if_that_is_asked_for(gaits, train, tmp_path):
+    """Validation is often best before the residual network has learned."""
+    last = replace(SMOKE, final=True)
+    train(tmp_path, last, name="strnn")
+    assert not (tmp_path / "best.safetensors").exists()
+    assert last.weights == "last.safetensors" and PRESETS["strnn"]["ship"].final
+    tensors, about = read_checkpoint(tmp_path / "checkpoint.safetensors")
+    assert about["update"] == SMOKE.updates
+    model = motionlab.load(tmp_path / "last.safetensors")
+    assert all(torch.equal(tensors[f"model.{k}"], v) for k, v in model.state_dict().items())
+
+
 def test_it_learns(gaits, train, tmp_path):
     preset = replace(
         PRESETS["strnn-temporal"]["smoke"], frames=10, predict=5, updates=150, decay=50,

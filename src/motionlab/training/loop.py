@@ -36,7 +36,7 @@ OPTIMIZERS = {
 }
 CHECKPOINT = "checkpoint.safetensors"
 # May change when a training goes on, as long as the updates already made would have been the same.
-_MAY_CHANGE = ("updates", "decay", "snapshots")
+_MAY_CHANGE = ("updates", "decay", "snapshots", "final")
 
 
 def train(

@@ -13,7 +13,7 @@ from ..errors import TrainingError
 from ..models import BidirectionalRnn, Strnn
 from ..models.strnn import ALONE, BEHIND, FIRST
 from .prepared import Prepared
-from .presets import Preset
+from .presets import BEST, LAST, Preset
 from .windows import Windows
 
 
@@ -79,6 +79,9 @@ class StrnnPreset(Preset):
     """Updates of the second stage, just before the third; 0: there are no stages."""
     behind: int = 0
     """Updates of the third stage, the last of all."""
+    final: bool = False
+    """Whether the last weights are kept and not those that were best in validation, which may be
+    from before the residual network has learned anything."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -100,6 +103,11 @@ class StrnnPreset(Preset):
     def partial(self) -> bool:
         """Whether it is trained in stages."""
         return self.alone + self.behind > 0
+
+    @property
+    def weights(self) -> str:
+        """The file that a training is for."""
+        return LAST if self.final else BEST
 
     def stage(self, update: int) -> int:
         """`FIRST`, `ALONE` or `BEHIND`, of an update counted from 0."""
@@ -171,7 +179,7 @@ _STRNN = {
     "table": _TABLE,
     "ship": replace(
         _TABLE, updates=40_000, decay=16_000, validate_every=1_000, width=256, quiet=43_000,
-        alone=2_000, behind=6_000, bones=0.1,
+        alone=2_000, behind=6_000, bones=0.1, final=True,
     ),
     "paper": replace(
         _TABLE, updates=500_000, decay=0, width=512, validate_every=5_000, optimizer="adadelta",

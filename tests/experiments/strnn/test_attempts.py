@@ -18,7 +18,7 @@ def network(walks):
 def test_a_price_on_bones_brings_them_nearer_to_their_lengths(walks):
     model, data = network(walks), in_body_frame(walks)
     free = network(walks)
-    attempts.taught(free, Attempt(""), data, 40)
+    attempts.taught(free, Attempt("", bones=0.0), data, 40)
     model.requires_grad_(False)  # as `motionlab.load` gives it
     attempts.taught(model, Attempt("", bones=10.0), data, 40)
     true = model.normalizer(torch.stack([clip[:20] for clip in data.clips("val")]))
