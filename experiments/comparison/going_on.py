@@ -24,7 +24,7 @@ from .begun import Begun
 from .trainings import joints_alone, rows_of
 
 GoOn = Callable[..., Tensor]  # (begun, frames, seed, quiet=False)
-STRNN_NOISE, ACLSTM_NOISE = 0.05, 0.1  # as the shipped ones have been found to need
+STRNN_NOISE, ACLSTM_NOISE = 0.02, 0.1  # as the shipped ones have been found to need
 RECENT = 1.0  # seconds that tell a leader how fast he goes, and which way
 SLOWEST = 0.2  # m/s that a path is walked at
 
