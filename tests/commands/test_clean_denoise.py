@@ -75,8 +75,7 @@ def test_a_pose_that_is_held_while_cameras_tremble_is_filled(here, capsys):
     write_bvh(held(seen), "held.bvh")
     assert main(["clean", "held.bvh", "--denoise", "auto", "--out", "x.bvh"]) == 0
     said = capsys.readouterr().out
-    assert "12 frames in which all stands still while the rest trembles not believed" in said
-    assert "(25, 26, 27, 28, 29, ...)" in said
+    assert "12 frames not believed, as all is held there and trembles elsewhere (25, 26, 27" in said
     off = lambda file: (
         100 * (read_bvh(file).positions() - WALK.positions())[25:37].norm(dim=-1).mean()
     )
@@ -86,7 +85,7 @@ def test_a_pose_that_is_held_while_cameras_tremble_is_filled(here, capsys):
 def test_a_pose_that_is_held_in_a_calm_clip_may_be_somebody_who_stands(here, capsys):
     write_bvh(held(WALK), "held.bvh")
     assert main(["clean", "held.bvh", "--denoise", "auto", "--out", "x.bvh"]) == 0
-    assert "stands still" not in capsys.readouterr().out
+    assert "held there" not in capsys.readouterr().out
 
 
 def test_a_pose_that_is_held_to_the_end_is_none_that_was_lost():

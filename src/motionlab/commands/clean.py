@@ -84,10 +84,8 @@ class Clean(Written):
         if frames:
             said.append(f"{_counted(frames)} not believed ({_some(frames)})")
         if held:
-            said.append(
-                f"{_counted(held)} in which all stands still while the rest trembles not believed "
-                f"({_some(held)})"
-            )
+            why = "not believed, as all is held there and trembles elsewhere"
+            said.append(f"{_counted(held)} {why} ({_some(held)})")
         frames = sorted({*frames, *held})
         if record["way"] == "filter":
             said.append("the network does not know such motion, so it was only smoothed")
