@@ -12,6 +12,7 @@ from motionlab import corrupt, read_bvh, write_bvh
 from motionlab.__main__ import main
 from motionlab.commands.clean_report import write_report
 from motionlab.datasets import gaits
+from motionlab.solvers.denoise_seen import held_frames
 
 WALK = gaits.make(seconds=2, speed=1.2, name="walk")
 WILD = [20, 41]
@@ -55,6 +56,43 @@ def test_frames_that_jump_are_told_and_alone_changed(here, capsys):
     assert moved.max() < 1e-4
     page = (here / "x.html").read_text()
     assert "2 frames that were not believed" in page and page.count('class="wild"') >= 2
+
+
+def held(motion, first=25, after=37):
+    """A stretch that a program wrote as the last frame before it, as cameras had lost the body."""
+    before = torch.arange(len(motion))
+    before[first:after] = first - 1
+    return replace(
+        motion,
+        root_positions=motion.root_positions[before],
+        rotations=motion.rotations[before],
+        contacts=None,
+    )
+
+
+def test_a_pose_that_is_held_while_cameras_tremble_is_filled(here, capsys):
+    seen = corrupt.tremble(WALK, 0.01, 0.03, generator=torch.Generator().manual_seed(0))
+    write_bvh(held(seen), "held.bvh")
+    assert main(["clean", "held.bvh", "--denoise", "auto", "--out", "x.bvh"]) == 0
+    said = capsys.readouterr().out
+    assert "12 frames not believed, as all is held there and trembles elsewhere (25, 26, 27" in said
+    off = lambda file: (
+        100 * (read_bvh(file).positions() - WALK.positions())[25:37].norm(dim=-1).mean()
+    )
+    assert off("x.bvh") < 0.5 * off("held.bvh")
+
+
+def test_a_pose_that_is_held_in_a_calm_clip_may_be_somebody_who_stands(here, capsys):
+    write_bvh(held(WALK), "held.bvh")
+    assert main(["clean", "held.bvh", "--denoise", "auto", "--out", "x.bvh"]) == 0
+    assert "held there" not in capsys.readouterr().out
+
+
+def test_a_pose_that_is_held_to_the_end_is_none_that_was_lost():
+    seen = corrupt.tremble(WALK, 0.01, 0.03, generator=torch.Generator().manual_seed(0))
+    assert held_frames(held(seen, 30, 40)).nonzero()[:, 0].tolist() == [*range(30, 40)]
+    assert not held_frames(held(seen, 50, len(seen))).any()
+    assert not held_frames(seen).any() and not held_frames(held(seen, 1, len(seen))).any()
 
 
 def test_three_frames_are_refused_in_words(here, capsys):

@@ -80,10 +80,13 @@ class Clean(Written):
         ]
         if record["way"] == "unchanged":
             return motion, [*said, "so little that nothing was changed"], []
-        frames = record["outliers"]
+        frames, held = record["outliers"], record["held"]
         if frames:
-            some = ", ".join(map(str, frames[:5])) + (", ..." if len(frames) > 5 else "")
-            said.append(f"{len(frames)} frames not believed ({some})")
+            said.append(f"{_counted(frames)} not believed ({_some(frames)})")
+        if held:
+            why = "not believed, as all is held there and trembles elsewhere"
+            said.append(f"{_counted(held)} {why} ({_some(held)})")
+        frames = sorted({*frames, *held})
         if record["way"] == "filter":
             said.append("the network does not know such motion, so it was only smoothed")
         elif record["way"] == "map":
@@ -92,6 +95,15 @@ class Clean(Written):
             said.append("the rest is calm: only these frames were changed")
         said.append(_moved(motion, found, frames))
         return found, said, frames
+
+
+def _counted(frames: list[int]) -> str:
+    return f"{len(frames)} frame{'s' if len(frames) > 1 else ''}"
+
+
+def _some(frames: list[int]) -> str:
+    """The first five of some frames."""
+    return ", ".join(map(str, frames[:5])) + (", ..." if len(frames) > 5 else "")
 
 
 def _moved(before: Motion, after: Motion, wild: list[int]) -> str:

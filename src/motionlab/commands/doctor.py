@@ -130,8 +130,7 @@ def _pictures() -> Finding:
     reason = probe.why_not()
     if not reason:
         return Finding("pictures by VTK", True, "it renders here")
-    remedy = probe.MISSING if reason == probe.NOT_INSTALLED else probe.REMEDY
-    return Finding("pictures by VTK", False, remedy.format(reason=reason))
+    return Finding("pictures by VTK", False, probe.remedy(reason))
 
 
 def _films() -> Finding:

@@ -57,10 +57,12 @@ from .denoise_checks import (
 )
 from .denoise_known import least
 from .denoise_seen import (
+    FEWEST,
     YAW,
     NoiseLevels,
     Seen,
     cross_validated,
+    held_frames,
     known_everywhere,
     look,
     motion_of,
@@ -96,7 +98,8 @@ def clean_recording(
     """A recording of any rig that stands on legs, at any rate; see `denoise` for arguments and record.
 
     noise is that of the recording's own frames, brought to the network's body. reference : as of
-    `retarget`, tells how the rig stands. The motion that comes back has no contacts.
+    `retarget`, tells how the rig stands. The motion that comes back has no contacts. Where the clip
+    trembles, frames that repeat the one before them were not seen either; the record lists them as "held".
 
     Raises
     ------
@@ -118,6 +121,8 @@ def clean_recording(
             + other_unit(too_large=size >= LARGEST)
         )
     there = mask_of(motion, missing)
+    held = _lost(motion, there)
+    there = there & ~held[:, None]
     known = known_everywhere(motion, there)
     numbers, mean = channels_of(known)
     levels = None if noise is None else check_levels(noise)
@@ -147,7 +152,23 @@ def clean_recording(
             found = as_seen(motion, found, believed_joints(seen))
         found = replace(found, contacts=None)
     seconds = time.process_time() - begin
-    return Denoised(found, record_of(motion, found, there, own, done, noise is None, seconds))
+    record = record_of(motion, found, there, own, done, noise is None, seconds)
+    return Denoised(found, {**record, "held": held.nonzero()[:, 0].tolist()})
+
+
+def _lost(motion: Motion, there: Tensor) -> Tensor:
+    """Frames (frames,) in which a program held what cameras lost; none in a clip that is calm elsewhere.
+
+    there : bool (frames, joints), what was seen.
+    """
+    held = held_frames(motion) & there.all(1)
+    none = torch.zeros_like(held)
+    left = there & ~held[:, None]
+    if not held.any() or int(left[:, 0].sum()) < FEWEST:
+        return none
+    numbers, _ = channels_of(known_everywhere(motion, left))
+    _, levels = look(torch.from_numpy(numbers), left)
+    return none if calm(levels) else held
 
 
 def _brought_over(

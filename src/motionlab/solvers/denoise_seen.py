@@ -36,6 +36,7 @@ FREEDOMS, FOLDS, NEARLY = (0.5, 1.0, 2.0, 4.0, 8.0), 4, 0.03
 FAR, FAR_ROOT, FAR_ANGLE = 3.5, 0.015, 0.05
 ALONE = 3  # frames; of outliers that are as near to each other the farthest is judged first
 FEWEST = 8  # frames; fewer do not tell noise from motion
+SAME = 1e-5  # metres and entries of rotations; what differs by less is one pose, written twice
 
 
 class NoiseLevels(NamedTuple):
@@ -83,6 +84,23 @@ def known_everywhere(motion: Motion, mask: Tensor) -> Motion:
     never = ~mask.any(0)
     rotations = torch.where(never[:, None, None], torch.eye(3), motion.rotations)
     return filled(replace(motion, rotations=rotations), ~(mask | never))
+
+
+def held_frames(motion: Motion) -> Tensor:
+    """Frames, bool (frames,), in which all is as in the frame before, and later moves again.
+
+    So programs write what cameras lost. Whoever stands still where cameras tremble is never twice the same;
+    in a calm clip it may be a person, so ask of those that tremble only. A pose that is held to the clip's
+    end, or from its beginning, is none: nobody lost it between two others.
+    """
+    moved = (motion.root_positions.diff(dim=0).abs().amax(1) > SAME) | (
+        motion.rotations.diff(dim=0).abs().flatten(1).amax(1) > SAME
+    )
+    found = torch.zeros(len(motion), dtype=torch.bool)
+    if moved.any():
+        first, last = moved.nonzero()[[0, -1], 0].tolist()
+        found[first + 1 : last + 1] = ~moved[first:last]
+    return found
 
 
 def features_of(encoding: JointAngles, rows: Tensor, contacts: Tensor | None) -> Tensor:

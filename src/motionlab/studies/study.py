@@ -56,12 +56,17 @@ class Rules:
     same_answer: float = 0.95
     """Largest share of clips that may have got one and the same answer."""
 
+    @property
+    def _checks(self) -> str:
+        if not self.failed_checks:
+            return "an attention check"
+        return f"more than {self.failed_checks} attention check{'s' * (self.failed_checks > 1)}"
+
     def in_words(self) -> list[str]:
         """Each rule as a sentence."""
         return [
             "Only whole answers count: every item judged, each after it was seen to its end.",
-            f"Left out is who answers more than {self.failed_checks} attention checks otherwise than "
-            "they ask.",
+            f"Left out is who answers {self._checks} otherwise than asked.",
             f"Left out is who gives one and the same answer to more than {self.same_answer:.0%} of the "
             "clips.",
             "Of several files of one rater the first that is whole counts.",

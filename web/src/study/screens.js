@@ -148,7 +148,7 @@ export function end(host, content, { saved, state, text, save, anew }) {
     make("div", { className: "ml-buttons" }, make("button", { type: "button", className: "ml-load", onclick: save }, "Save my answers"), again),
     sure,
     ...(key ? [ownAnswers(content, state)] : []),
-    make("p", {}, contact ? `Please send the file to: ${contact}` : "Please hand the file to who asked you to take part."),
-    make("details", { className: "ml-more" }, make("summary", {}, "No file can be saved here"), make("p", {}, "Copy this text and send it instead:"), whole),
+    make("p", {}, contact ? `Please send the file to: ${contact}` : "If somebody asked you to take part, hand the file to them."),
+    make("details", { className: "ml-more" }, make("summary", {}, "If no file can be saved"), make("p", {}, "Copy this text, and hand it on in place of the file:"), whole),
   );
 }

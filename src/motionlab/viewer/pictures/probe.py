@@ -26,7 +26,13 @@ REMEDY = (
     "For the better ones install a software renderer: on Debian or Ubuntu "
     "`apt install libegl1 libgl1-mesa-dri` (or libosmesa6), with conda `conda install mesalib`."
 )
+TOO_SLOW = (
+    "pictures are drawn by matplotlib this time: a trial of VTK had made {reason}, perhaps because the "
+    "machine is busy. Where it always is so slow, `MOTIONLAB_BACKEND=vtk` in the environment takes VTK "
+    "without a trial, and `MOTIONLAB_BACKEND=matplotlib` asks for none."
+)
 NOT_INSTALLED = "pyvista is not installed"
+_LATE = "no picture within"
 MISSING = "pictures are drawn by matplotlib: {reason}. For the better ones `pip install pyvista`."
 
 
@@ -50,6 +56,13 @@ def choose(backend: str | None = None) -> str:
     return "matplotlib" if reason else "vtk"
 
 
+def remedy(reason: str) -> str:
+    """In words, what draws instead of VTK for a reason of `why_not`, and what to do about it."""
+    if reason == NOT_INSTALLED:
+        return MISSING.format(reason=reason)
+    return (TOO_SLOW if reason.startswith(_LATE) else REMEDY).format(reason=reason)
+
+
 @cache
 def why_not() -> str:
     """Say why VTK cannot render here; empty if it can. One trial (2 s) a process."""
@@ -63,7 +76,7 @@ def why_not() -> str:
             timeout=SECONDS,
         )
     except subprocess.TimeoutExpired:
-        reason = f"no picture within {SECONDS} s"
+        reason = f"{_LATE} {SECONDS} s"
     else:
         reason = "" if done.returncode == 0 else f"a trial ended with status {done.returncode}"
     return reason
@@ -71,5 +84,4 @@ def why_not() -> str:
 
 @cache
 def _warn_once(reason: str) -> None:
-    remedy = MISSING if reason == NOT_INSTALLED else REMEDY
-    warnings.warn(remedy.format(reason=reason), stacklevel=4)
+    warnings.warn(remedy(reason), stacklevel=4)
