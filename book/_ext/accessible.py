@@ -6,7 +6,6 @@
 * The search button is named "Search" and says "Search Ctrl+K"; the names of the colour button's
   pictures would do as well as its own.
 * A table or a line of code that is wider than the page scrolls, but not by keys.
-* Widgets, which come after the page, have sliders and pictures without names.
 
 What is left is seen by tests/browser/check_access.py.
 """
@@ -31,18 +30,6 @@ addEventListener("DOMContentLoaded", () => {
   addEventListener("toggle", reach, true); // what was folded has no width before
   addEventListener("click", () => setTimeout(reach));
   addEventListener("resize", reach);
-  if (!document.querySelector('script[type="application/vnd.jupyter.widget-view+json"]')) return;
-  const names = () => {
-    for (const handle of document.querySelectorAll(".noUi-handle:not([aria-label])")) {
-      const label = handle.closest(".jupyter-widgets")?.querySelector(".widget-label");
-      handle.setAttribute("aria-label", label?.textContent || "value");
-    }
-    for (const picture of document.querySelectorAll(".jp-RenderedImage > img:not([alt])")) {
-      picture.alt = "What the sliders above say, as a picture";
-    }
-  };
-  const often = setInterval(names, 500);
-  setTimeout(() => clearInterval(often), 60_000);
 });
 """
 
