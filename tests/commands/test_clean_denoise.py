@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import any_rig
 import pytest
+import rig_names
 import torch
 
-from motionlab import corrupt, read_bvh, write_bvh
+from motionlab import Motion, corrupt, read_bvh, write_bvh
 from motionlab.__main__ import main
 from motionlab.commands.clean_report import write_report
 from motionlab.datasets import gaits
@@ -93,6 +95,30 @@ def test_a_pose_that_is_held_to_the_end_is_none_that_was_lost():
     assert held_frames(held(seen, 30, 40)).nonzero()[:, 0].tolist() == [*range(30, 40)]
     assert not held_frames(held(seen, 50, len(seen))).any()
     assert not held_frames(seen).any() and not held_frames(held(seen, 1, len(seen))).any()
+
+
+def test_a_reference_tells_how_a_rig_stands(here, capsys):
+    """A handstand on a rig whose rest pose is no body: its own frames say that the head is below."""
+    axes = any_rig.random_axes(21, 4)
+    stance = Motion(WALK.skeleton, torch.zeros(9, 3), torch.eye(3).repeat(9, 21, 1, 1), 30)
+    upside = torch.diag(torch.tensor([1.0, -1.0, -1.0]))
+    turned = WALK.rotations.clone()
+    turned[:, 0] = upside @ turned[:, 0]
+    on_hands = replace(WALK, rotations=turned, contacts=None)
+    noisy = corrupt.tremble(on_hands, 0.01, 0.03, generator=torch.Generator().manual_seed(0))
+    write_bvh(any_rig.drawn(noisy, axes), "hands.bvh")
+    write_bvh(any_rig.drawn(stance, axes), "stands.bvh")
+    names = [f"its{name}" for name in WALK.skeleton.names]
+    write_bvh(rig_names.renamed(WALK, names), "other.bvh")
+    command = ["clean", "hands.bvh", "--denoise", "auto", "--out", "x.bvh", "--force"]
+    assert main(command) == 0
+    assert "pass --reference, a motion" in capsys.readouterr().out
+    assert main([*command, "--reference", "stands.bvh"]) == 0
+    assert "--reference" not in capsys.readouterr().out
+    assert main([*command, "--reference", "other.bvh"]) == 1
+    assert "The reference other is of another rig" in capsys.readouterr().err
+    assert main(["clean", "hands.bvh", "--out", "y.bvh", "--reference", "stands.bvh"]) == 1
+    assert "goes with --denoise" in capsys.readouterr().err
 
 
 def test_three_frames_are_refused_in_words(here, capsys):

@@ -11,7 +11,9 @@ import torch
 from tyro.conf import arg
 
 from ..errors import MotionLabError
+from ..io.readings import Readings
 from ..motion import Motion
+from ..skeleton import Skeleton
 from .choices import shown_first
 from .clips import files_of
 from .convert import Written
@@ -25,7 +27,7 @@ DEEPEST = 0.005
 SLIDES = 10.0
 
 
-@shown_first("path", "out", "denoise", "feet", "report", "to", "fps", "root_motion")
+@shown_first("path", "out", "denoise", "feet", "report", "reference", "to", "fps", "root_motion")
 @dataclass(kw_only=True)
 class Clean(Written):
     """Take noise away, or hold feet still on the floor while they are down, or both."""
@@ -38,7 +40,15 @@ class Clean(Written):
     report: Path | None = None
     """A page that plays before and after and shows what was changed where; of one file."""
 
+    reference: Path | None = None
+    """For --denoise: a file of the clips' own rig in which a person stands, arms hanging or spread; tells how
+    joint axes lie where the rest pose does not stand. If left out, each clip's own frames tell."""
+
     def run(self) -> None:
+        if self.reference is not None and self.denoise is None:
+            raise MotionLabError(
+                f"--reference {self.reference}: goes with --denoise; feet are held without it."
+            )
         self._levels = None if self.denoise in (None, AUTO) else _levels(self.denoise)
         if self.report is not None:
             if self.path.is_dir() and len(files_of(self.path)) > 1:
@@ -52,6 +62,12 @@ class Clean(Written):
                     f"--report {self.report}: is there already; --force overwrites it."
                 )
         super().run()
+
+    def meet(self, files: list[Path], how: Readings) -> None:
+        self._stands = None
+        if self.reference is not None:
+            its = replace(how.of(self.reference), tpose_first=False)
+            self._stands, _ = self.read(self.reference, its)
 
     def change(self, motion: Motion, file: Path) -> tuple[Motion, list[str]]:
         before, said, wild = motion, [], []
@@ -69,9 +85,13 @@ class Clean(Written):
 
     def _denoised(self, motion: Motion) -> tuple[Motion, list[str], list[int]]:
         """The clean motion, what is said of it, and frames that were not believed."""
+        from ..retargeting.stance import stances
         from ..solvers import clean_recording
 
-        found, record = clean_recording(motion, noise=self._levels, progress=True)
+        stands = None
+        if self._stands is not None:
+            (stands,) = stances([motion], Skeleton.canonical(), self._stands).references
+        found, record = clean_recording(motion, noise=self._levels, reference=stands, progress=True)
         noise = record["noise"]
         told = "estimated" if noise["estimated"] else "as said"
         said = [

@@ -54,6 +54,21 @@ def test_parts_have_their_columns_and_say_what_they_leave_out():
     assert [row["parameters (million)"], row["weights (MB)"]] == ["1.3", "2.7"]
 
 
+def test_what_is_said_of_several_rows_stands_once():
+    its = found(3)
+    its["rows"]["method 0"]["left out"] = {"alive": "not measured yet"}
+    its["rows"]["method 1"]["left out"] = {"alive": "as method 0"}
+    its["rows"]["method 2"]["left out"] = {
+        "alive": "not measured yet",
+        "variety": "not measured yet",
+    }
+    assert viewer.method_table(its).notes == [
+        "method 0; method 2, alive: not measured yet.",
+        "method 1, alive: as method 0.",
+        "method 2, variety: not measured yet.",
+    ]
+
+
 @pytest.mark.parametrize(("rows", "folds"), [(11, False), (12, True)])
 def test_more_than_twelve_rows_fold(rows, folds):
     shown = viewer.method_table(found(rows))._repr_html_()

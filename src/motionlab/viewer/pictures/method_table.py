@@ -104,10 +104,13 @@ def _cost(row: Mapping, found: Mapping) -> dict[str, str]:
 
 
 def _notes(found: Mapping, names) -> list[str]:
-    """What is left out of the rows, and why; a line each."""
+    """What is left out of the rows, and why; a line for all rows of which the same is said."""
+    titles: dict[tuple[str, str], list[str]] = {}
+    for title, row in found["rows"].items():
+        for name, why in row["left out"].items():
+            if name in names:
+                titles.setdefault((name, why), []).append(title)
     return [
-        f"{title}, {name if name != '256' else '256 characters'}: {why}."
-        for title, row in found["rows"].items()
-        for name, why in row["left out"].items()
-        if name in names
+        f"{'; '.join(rows)}, {name if name != '256' else '256 characters'}: {why}."
+        for (name, why), rows in titles.items()
     ]
