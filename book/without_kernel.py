@@ -20,6 +20,8 @@ Widget = dict[str, Any]  # as saved with a page: model_name, state
 def without_widgets(page: nbformat.NotebookNode) -> nbformat.NotebookNode:
     """The page with no widgets: progress bars are left out, sliders become a line and what they gave.
 
+    Cells and their metadata stay as they are: by these MyST-NB finds a page in its cache.
+
     Raises
     ------
     ValueError : a widget that shows neither; the message names the cell.
@@ -27,14 +29,11 @@ def without_widgets(page: nbformat.NotebookNode) -> nbformat.NotebookNode:
     saved = page.metadata.pop("widgets", {}).get(STATE, {}).get("state", {})
     code = [cell for cell in page.cells if cell.cell_type == "code"]
     for at, cell in enumerate(code, 1):
-        try:
-            cell.outputs = [new for output in cell.outputs for new in _in_page(output, saved, cell)]
-        except ValueError as error:
-            raise ValueError(f"code cell {at}: {error}") from None
+        cell.outputs = [new for output in cell.outputs for new in _in_page(output, saved, at)]
     return page
 
 
-def _in_page(output: Widget, saved: dict[str, Widget], cell: nbformat.NotebookNode) -> list[Widget]:
+def _in_page(output: Widget, saved: dict[str, Widget], cell: int) -> list[Widget]:
     """What stands in a page for one output of a cell."""
     if VIEW not in output.get("data", {}):
         return [output]
@@ -43,12 +42,12 @@ def _in_page(output: Widget, saved: dict[str, Widget], cell: nbformat.NotebookNo
         return []
     given = [new for widget in tree for new in widget["state"].get("outputs", ())]
     if not given:
-        raise ValueError("a widget that a page can't move; show what it can: viewer.knobs")
+        raise ValueError(
+            f"code cell {cell}: a widget that a page can't move; show what a page can: viewer.knobs"
+        )
     settings = [f"{w['state']['description']} {w['state']['value']:g}" for w in tree if _slides(w)]
     note = f"A kernel has sliders here; this page shows {', '.join(settings)}:"
     line = {"text/html": f"<p><small>{html.escape(note)}</small></p>", "text/plain": note}
-    picture = cell.metadata.setdefault("mystnb", {}).setdefault("image", {})
-    picture.setdefault("alt", f"What the code above gives for {', '.join(settings)}")
     return [nbformat.v4.new_output("display_data", line), *map(nbformat.from_dict, given)]
 
 

@@ -1,6 +1,7 @@
 """The files around the code say what is true: environment, lock, map, reference, imports."""
 
 import ast
+import doctest
 import graphlib
 import importlib.util
 import json
@@ -255,6 +256,27 @@ def test_functions_of_the_reference_are_where_it_says():
                 importlib.import_module(path)
             found = getattr(found, part)
         assert callable(found), name
+
+
+EXAMPLE = re.compile(r">>> (?!.*doctest: \+SKIP)")  # one of them needs a slider that is on a page
+SHOWN = [name for name, path in MODULES.items() if EXAMPLE.search(path.read_text("utf-8"))]
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_examples_of_the_reference_run(name):
+    tried = doctest.testmod(importlib.import_module(f"motionlab.{name}"))
+    assert tried.failed == 0 and tried.attempted
+
+
+def test_the_example_at_the_head_of_the_reference_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    motionlab.write_bvh(motionlab.datasets.gaits.make(seconds=1), "walk.bvh", units="cm")
+    examples = re.findall(
+        r"```python\n(.*?)```", (ROOT / "book" / "api.md").read_text("utf-8"), re.DOTALL
+    )
+    assert examples
+    for example in examples:
+        exec(compile(example, "book/api.md", "exec"), {})
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -44,6 +45,20 @@ def test_make_knows_the_commands():
     for target in targets:
         run = subprocess.run(["make", "-n", target], cwd=ROOT, capture_output=True, text=True)
         assert run.returncode == 0, run.stderr
+
+
+def test_a_row_tells_what_each_command_needs():
+    """One for each target of the Makefile and each command of the command line."""
+    from motionlab.__main__ import COMMANDS
+
+    section = README.partition("## What each command needs")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `([^`]+)`[^|]*\|(.*)\|$", section, re.MULTILINE)
+    assert all(len(cells.split("|")) == 4 and cells.split("|")[1].strip() for _, cells in rows)
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = re.search(r"^\.PHONY: (.*) active-environment$", makefile, re.MULTILINE)[1].split()
+    commands = [command.__metadata__[0].name for command in get_args(COMMANDS)]
+    wanted = [f"make {target}" for target in targets] + commands
+    assert sorted(name for name, _ in rows) == sorted(wanted)
 
 
 def test_the_data_commands_run(tmp_path):

@@ -3,9 +3,10 @@
 * "Show the code" is named "Toggle hidden content" to those who listen: they are to hear what is seen.
 * A long signature is a list of definitions without terms: plain lines instead.
 * References are a list whose entries are no list items: no list.
+* A picture without a name is called by its file's.
 * The search button is named "Search" and says "Search Ctrl+K"; the names of the colour button's
   pictures would do as well as its own.
-* A table or a line of code that is wider than the page scrolls, but not by keys.
+* A table, a formula or a line of code that is wider than the page scrolls, but not by keys.
 
 What is left is seen by tests/browser/check_access.py.
 """
@@ -17,12 +18,13 @@ from sphinx.application import Sphinx
 SIGNATURE = re.compile(
     r'<dl>\s*(?P<lines>(?:<dd><em class="sig-param">.*?</dd>\s*)+)</dl>', re.DOTALL
 )
+UNNAMED = re.compile(r'alt="(\.\./)*_images/[0-9a-f]{32,}\.\w+"')
 NAMES_AS_SEEN = """
 addEventListener("DOMContentLoaded", () => {
   for (const button of document.querySelectorAll(".search-button-field")) button.removeAttribute("aria-label");
   for (const picture of document.querySelectorAll(".theme-switch")) picture.removeAttribute("title");
   const reach = () => {
-    for (const box of document.querySelectorAll(".bd-article :is(table, pre)")) {
+    for (const box of document.querySelectorAll(".bd-article :is(table, pre, mjx-container[display])")) {
       if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
     }
   };
@@ -30,6 +32,7 @@ addEventListener("DOMContentLoaded", () => {
   addEventListener("toggle", reach, true); // what was folded has no width before
   addEventListener("click", () => setTimeout(reach));
   addEventListener("resize", reach);
+  addEventListener("load", () => window.MathJax?.startup?.promise.then(reach));
 });
 """
 
@@ -38,6 +41,7 @@ def rewrite(body: str) -> str:
     """The same HTML without these faults."""
     body = body.replace('<summary aria-label="Toggle hidden content">', "<summary>")
     body = body.replace('<div role="list" class="citation-list">', '<div class="citation-list">')
+    body = UNNAMED.sub('alt="A picture that the code above draws"', body)
     return SIGNATURE.sub(_as_lines, body)
 
 

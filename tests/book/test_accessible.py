@@ -37,3 +37,11 @@ def test_references_are_no_list(accessible):
     assert accessible.rewrite('<div role="list" class="citation-list">x</div>') == (
         '<div class="citation-list">x</div>'
     )
+
+
+def test_a_picture_is_not_called_by_its_file(accessible):
+    path = f"../_images/{'0a' * 30}.png"
+    named = f'<img alt="Two walks" src="{path}">'
+    page = accessible.rewrite(f'<img alt="{path}" src="{path}">{named}')
+    assert f'alt="{path}"' not in page and page.count(f'src="{path}"') == 2
+    assert page.endswith(named)

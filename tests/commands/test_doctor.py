@@ -81,7 +81,11 @@ def test_folders_that_are_none_are_told(bare, monkeypatch, tmp_path, capsys):
     ("done", "there", "said"),
     [
         (SimpleNamespace(stdout=b"<body>WebGL is there", returncode=0), True, "browser"),
-        (SimpleNamespace(stdout=b"<body>WebGL is missing", returncode=0), False, "has no WebGL"),
+        (
+            SimpleNamespace(stdout=b"<body>WebGL is missing", returncode=0),
+            False,
+            "hardware acceleration",
+        ),
         (SimpleNamespace(stdout=b"", returncode=5), False, "opens no page (status 5)"),
         (subprocess.TimeoutExpired("browser", 60), False, "no page within 60 s"),
         (PermissionError(13, "Permission denied"), False, "can't be started (Permission denied)"),

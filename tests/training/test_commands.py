@@ -132,6 +132,7 @@ def test_a_refiner_is_trained_judged_and_used(here, capsys, monkeypatch):
         (["train", "lstm-gmm", "--data", "none.npz"], "no such file"),
         (["train", "lstm-gmm", *SMOKE, "--learning-rate", "-1"], "learning_rate"),
         (["train", "lstm-gmm", *SMOKE, "--from", "none.safetensors"], "no such file"),
+        (["sample", "aclstm-martial", "--refine", "--out", "a.bvh"], "has no refiner"),
     ],
 )
 def test_bad_arguments_are_answered(here, capsys, arguments, said):

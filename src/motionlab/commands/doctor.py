@@ -179,7 +179,10 @@ def _browser() -> Finding:
     if b"WebGL is there" in done.stdout:
         return Finding(what, True, path)
     if b"WebGL is missing" in done.stdout:
-        return Finding(what, False, f"{path} has no WebGL: players show still pictures in it")
+        said = (
+            f"{path} has no WebGL: players show still pictures in it; switch hardware acceleration"
+        )
+        return Finding(what, False, f"{said} on in its settings, or let CHROMIUM name another")
     return Finding(what, False, f"{path} opens no page (status {done.returncode})")
 
 

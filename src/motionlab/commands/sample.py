@@ -169,13 +169,18 @@ def refiner_of(model: nn.Module, called: str, named: str | None = None) -> nn.Mo
     from ..weights import load, names
 
     its = called.replace("lstm-gmm", "refiner")  # as shipped weights are called
-    if its not in names():
+    if its == called or its not in names():
         its = "refiner-contacts" if "contacts" in model.encoding.slices else "refiner"
     name = named or its
     refiner = load(name)
     if not isinstance(refiner, Refiner):
         raise MotionLabError(f"--refiner {name}: is no refiner, but {type(refiner).__name__}.")
     if refiner.encoding.config() != model.encoding.config():
+        if named is None:
+            raise MotionLabError(
+                f"{called} has no refiner: those that ship correct what lstm-gmm, lstm-gmm-contacts "
+                "and lstm-gmm-permissive make. Leave --refine out."
+            )
         raise MotionLabError(
             f"{name} refines features of another kind than {called}'s: with contacts or "
             "without, as angles or not, of another body or frame rate."

@@ -1,0 +1,45 @@
+"""Claims that are named in the text lead to the ledger."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+KNOWN = {"W8": ("w8", "No hop. (not testable here)"), "Z1": ("z1-plain", "Freezes. (partly)")}
+
+
+@pytest.fixture(scope="module")
+def claim_links():
+    pytest.importorskip("sphinx")
+    path = Path(__file__).parents[2] / "book" / "_ext" / "claim_links.py"
+    spec = importlib.util.spec_from_file_location("claim_links", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_names_become_links_and_nothing_else_does(claim_links):
+    from docutils import nodes
+    from docutils.core import publish_doctree
+
+    page = publish_doctree(
+        "Z1 at the head\n==============\n\nClaim *W8* and W99, Z1: see ``W8`` and `W8 there <x.html>`_.\n"
+    )
+    before = page.astext()
+    claim_links.link(page, KNOWN, "claims.html")
+    assert page.astext() == before
+    links = [(a.astext(), a["refuri"], a.get("reftitle")) for a in page.findall(nodes.reference)]
+    assert links == [
+        ("W8", "claims.html#w8", KNOWN["W8"][1]),
+        ("Z1", "claims.html#z1-plain", KNOWN["Z1"][1]),
+        ("W8 there", "x.html", None),
+    ]
+
+
+def test_every_claim_is_known_with_its_verdict(claim_links):
+    from experiments.claims import verdicts
+
+    known = claim_links.told()
+    assert set(known) >= {claim["id"] for claim in verdicts.claims()} | {"W1", "S10"}
+    assert known["W1"] == known["W1-variety"]
+    assert known["W9"][0] == "w9" and known["W9"][1].endswith("(not testable here)")

@@ -1,0 +1,41 @@
+"""Tables of results: long ones fold, counts are whole, what is missing is a dash."""
+
+import importlib.util
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+
+@pytest.fixture(scope="module")
+def rewrite():
+    pytest.importorskip("bs4")
+    path = Path(__file__).parents[2] / "book" / "_ext" / "tables.py"
+    spec = importlib.util.spec_from_file_location("tables", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.rewrite
+
+
+@pytest.mark.parametrize(("rows", "folds"), [(12, False), (13, True)])
+def test_a_table_of_more_than_twelve_rows_folds(rewrite, rows, folds):
+    page = rewrite(f"<p>before</p>{pd.DataFrame({'m': range(rows)}).to_html()}<p>after</p>")
+    assert page.startswith("<p>before</p>") and page.endswith("<p>after</p>")
+    assert (f"<summary>A table of {rows} rows</summary>" in page) == folds
+    assert page.count("<tr") == rows + 1
+
+
+def test_counts_are_whole_and_what_was_measured_stays(rewrite):
+    names = ["updates", "seconds", "skate"]
+    table = pd.DataFrame([[500000.0, 2.0, 1.5], [3000.0, 3.0, None]], columns=names)
+    for page in (rewrite(table.to_html()), rewrite(table.T.to_html())):
+        assert "<td>500000</td>" in page and "<td>3000</td>" in page
+        assert "<td>2.0</td>" in page and "<td>1.5</td>" in page
+        assert "<td>–</td>" in page and "NaN" not in page
+    speeds = pd.DataFrame({"m": [1374.0, 12.5]}).to_html()
+    assert "<td>1374.0</td>" in rewrite(speeds)
+
+
+def test_other_tables_stay(rewrite):
+    other = "<table><tbody>" + "<tr><td>3000.0</td></tr>" * 20 + "</tbody></table>"
+    assert rewrite(other) == other
