@@ -1,6 +1,6 @@
 """Tables of results, as pandas writes them, made to be read.
 
-* A table of more than twelve rows folds, under a line that says how many they are.
+* A table of more than twenty rows folds, under a line that says how many they are.
 * Counts such as updates, which pandas writes as 500000.0 where a number is missing beside them, are
   written as 500000; what is missing is a dash, not NaN.
 """
@@ -10,7 +10,7 @@ import re
 from bs4 import BeautifulSoup
 from sphinx.application import Sphinx
 
-ROWS = 12  # more than these fold
+ROWS = 20  # more than these fold
 COUNT = (
     1000  # a column or row of whole numbers, the largest of them at least this, counts something
 )

@@ -17,7 +17,7 @@ def rewrite():
     return module.rewrite
 
 
-@pytest.mark.parametrize(("rows", "folds"), [(12, False), (13, True)])
+@pytest.mark.parametrize(("rows", "folds"), [(20, False), (21, True)])
 def test_a_table_of_more_than_twelve_rows_folds(rewrite, rows, folds):
     page = rewrite(f"<p>before</p>{pd.DataFrame({'m': range(rows)}).to_html()}<p>after</p>")
     assert page.startswith("<p>before</p>") and page.endswith("<p>after</p>")
