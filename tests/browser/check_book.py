@@ -311,10 +311,8 @@ def check_page(window: BrowserContext, base: str, path: Path, folder: Path) -> l
     visit.check_math()
     visit.check_width()
     if visit.page.viewport_size["width"] == DESKTOP[0]:
-        from_disk = base.startswith(
-            "file:"
-        )  # scripts may do less there; from a server they are the same
-        visit.check_players(EACH if from_disk else 1)
+        from_disk = base.startswith("file:")  # scripts may do less there
+        visit.check_players(EACH if from_disk else 1)  # from a server they are the same
         visit.check_scenes(EACH if from_disk else 1)
         if from_disk:
             check_access(visit)
