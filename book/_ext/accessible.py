@@ -12,6 +12,7 @@ What is left is seen by tests/browser/check_access.py.
 """
 
 import re
+from pathlib import Path
 
 from sphinx.application import Sphinx
 
@@ -19,10 +20,8 @@ SIGNATURE = re.compile(
     r'<dl>\s*(?P<lines>(?:<dd><em class="sig-param">.*?</dd>\s*)+)</dl>', re.DOTALL
 )
 UNNAMED = re.compile(r'alt="(\.\./)*_images/[0-9a-f]{32,}\.\w+"')
-NAMES_AS_SEEN = """
+REACHED = """
 addEventListener("DOMContentLoaded", () => {
-  for (const button of document.querySelectorAll(".search-button-field")) button.removeAttribute("aria-label");
-  for (const picture of document.querySelectorAll(".theme-switch")) picture.removeAttribute("title");
   const reach = () => {
     for (const box of document.querySelectorAll(".bd-article :is(table, pre, mjx-container[display])")) {
       if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
@@ -35,6 +34,21 @@ addEventListener("DOMContentLoaded", () => {
   addEventListener("load", () => window.MathJax?.startup?.promise.then(reach));
 });
 """
+
+
+# Of the theme's buttons, which are in no page's body. A script would do it too late now and then: another
+# one draws the pictures, names and all.
+BUTTONS = (
+    re.compile(r'(<button class="btn search-button-field[^>]*?)\s+aria-label="Search"'),
+    re.compile(r'(<i class="theme-switch [^>]*?)\s+title="[^"]*"'),
+)
+
+
+def buttons(page: str) -> str:
+    """A whole page whose buttons are named as they are seen."""
+    for names in BUTTONS:
+        page = names.sub(r"\1", page)
+    return page
 
 
 def rewrite(body: str) -> str:
@@ -55,6 +69,13 @@ def setup(app: Sphinx) -> dict:
         if "body" in context:
             context["body"] = rewrite(context["body"])
 
+    def finish(app, exception):
+        if exception is None and app.builder.format == "html":
+            for path in Path(app.outdir).rglob("*.html"):
+                if "_static" not in path.parts:
+                    path.write_text(buttons(path.read_text(encoding="utf-8")), encoding="utf-8")
+
     app.connect("html-page-context", process)
-    app.add_js_file(None, body=NAMES_AS_SEEN, priority=100)
+    app.connect("build-finished", finish)
+    app.add_js_file(None, body=REACHED, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

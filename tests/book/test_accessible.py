@@ -45,3 +45,17 @@ def test_a_picture_is_not_called_by_its_file(accessible):
     page = accessible.rewrite(f'<img alt="{path}" src="{path}">{named}')
     assert f'alt="{path}"' not in page and page.count(f'src="{path}"') == 2
     assert page.endswith(named)
+
+
+def test_the_themes_buttons_are_named_as_they_are_seen(accessible):
+    search = (
+        '<button class="btn search-button-field search-button__button" title="Search"{}>'
+        '<span class="search-button__default-text">Search</span></button>'
+    )
+    colour = (
+        '<button aria-label="Color mode"><i class="theme-switch fa-solid fa-sun"{}></i></button>'
+    )
+    named = search.format(' aria-label="Search"') + colour.format(
+        ' data-mode="light" title="Light"'
+    )
+    assert accessible.buttons(named) == search.format("") + colour.format(' data-mode="light"')
