@@ -1,19 +1,11 @@
 """What the book mends in the HTML of Sphinx and its themes, for those who hear it."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 
 
 @pytest.fixture(scope="module")
-def accessible():
-    pytest.importorskip("sphinx")
-    path = Path(__file__).parents[2] / "book" / "_ext" / "accessible.py"
-    spec = importlib.util.spec_from_file_location("accessible", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def accessible(extension):
+    return extension("accessible")
 
 
 def test_what_is_heard_is_what_is_seen(accessible):

@@ -1,21 +1,13 @@
 """Claims that are named in the text lead to the ledger."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 
 KNOWN = {"W8": ("w8", "No hop. (not testable here)"), "Z1": ("z1-plain", "Freezes. (partly)")}
 
 
 @pytest.fixture(scope="module")
-def claim_links():
-    pytest.importorskip("sphinx")
-    path = Path(__file__).parents[2] / "book" / "_ext" / "claim_links.py"
-    spec = importlib.util.spec_from_file_location("claim_links", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def claim_links(extension):
+    return extension("claim_links")
 
 
 def test_names_become_links_and_nothing_else_does(claim_links):

@@ -1,20 +1,12 @@
 """Tables of results: long ones fold, counts are whole, what is missing is a dash."""
 
-import importlib.util
-from pathlib import Path
-
 import pandas as pd
 import pytest
 
 
 @pytest.fixture(scope="module")
-def rewrite():
-    pytest.importorskip("bs4")
-    path = Path(__file__).parents[2] / "book" / "_ext" / "tables.py"
-    spec = importlib.util.spec_from_file_location("tables", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.rewrite
+def rewrite(extension):
+    return extension("tables").rewrite
 
 
 @pytest.mark.parametrize(("rows", "folds"), [(20, False), (21, True)])
