@@ -22,6 +22,11 @@ def _mean(cell: dict, method: str, measure: str) -> float:
 # -- W7 -------------------------------------------------------------------------------------------
 
 
+def _told(text: str, holds: bool) -> str:
+    """A line of a rule with many, marked if it does not hold."""
+    return text if holds else f"{text} (missed)"
+
+
 def w7(limits: dict, found: dict) -> Verdict:
     kinds, numbers, lines, close = _kinds(found), {}, [], []
     for gait in GAITS:
@@ -30,13 +35,16 @@ def w7(limits: dict, found: dict) -> Verdict:
             error = _mean(cell, "ours", ERROR) / _mean(cell, "as seen", ERROR)
             acceleration = _mean(cell, "ours", "acceleration over the truth's")
             skate, f1 = _mean(cell, "ours", SKATE), _mean(cell, "ours", "contact F1")
+            these = {
+                f"error {error:.2f} of the input's": error <= limits["close"],
+                f"acceleration {acceleration:.2f} of the truth's":
+                    abs(acceleration - 1) <= limits["smooth"],
+                f"skate {skate:.1f} cm/s": skate <= limits["slide"],
+                f"F1 {f1:.2f}": f1 >= limits["found"],
+            }  # fmt: skip
             close.append(error <= limits["close"])
-            lines += [abs(acceleration - 1) <= limits["smooth"], skate <= limits["slide"],
-                      f1 >= limits["found"], close[-1]]  # fmt: skip
-            numbers[f"{gait}, {noise}"] = (
-                f"error {error:.2f} of the input's, acceleration {acceleration:.2f} of the truth's, "
-                f"skate {skate:.1f} cm/s, F1 {f1:.2f}"
-            )
+            lines += these.values()
+            numbers[f"{gait}, {noise}"] = ", ".join(map(_told, these, these.values()))
     numbers["lines that hold"] = f"{sum(lines)} of {len(lines)}"
     some = all(close) and sum(lines) >= limits["some"] * len(lines)
     return Verdict(REPRODUCED if all(lines) else PARTLY if some else NOT, numbers)
@@ -49,21 +57,29 @@ def w7_filters(limits: dict, found: dict) -> Verdict:
     for gait in GAITS:
         for noise, limit in least.items():
             ratio = kinds[gait][noise]["error over the best filter's"]["value"]
-            numbers[f"{gait}, {noise}: error over the best filter's"] = ratio
             lines.append(ratio <= limits[limit])
+            numbers[f"{gait}, {noise}: error over the best filter's"] = _told(
+                f"{ratio:.2f}", lines[-1]
+            )
         gap = kinds[gait]["gap"]
         there = "error where it was hit (cm)"
         across = _mean(gap, "ours", there) / _mean(gap, "filled", there)
-        numbers[f"{gait}, gap: error there over the shortest way's"] = across
         lines.append(across <= limits["gap"])
+        numbers[f"{gait}, gap: error there over the shortest way's"] = _told(
+            f"{across:.2f}", lines[-1]
+        )
         for noise in (MID, HIGH):
             cell = kinds[gait][noise]
             skate = _mean(cell, "ours", SKATE) / _mean(cell, cell["best filter"], SKATE)
-            numbers[f"{gait}, {noise}: skate over the best filter's"] = skate
             lines.append(skate <= limits["skate"])
+            numbers[f"{gait}, {noise}: skate over the best filter's"] = _told(
+                f"{skate:.2f}", lines[-1]
+            )
     worst = max(cell["error over the best filter's"]["value"] for cell in kinds["unseen"].values())
-    numbers["unseen kinds, worst noise: error over the best filter's"] = worst
     lines.append(worst <= limits["unseen"])
+    numbers["unseen kinds, worst noise: error over the best filter's"] = _told(
+        f"{worst:.2f}", lines[-1]
+    )
     numbers["lines that hold"] = f"{sum(lines)} of {len(lines)}"
     sure = all(
         kinds[gait][noise]["error over the best filter's"]["high"] < 1

@@ -131,3 +131,11 @@ def test_a_run_is_written_and_gone_on_with(small, tmp_path, monkeypatch):
     denoising.main(small)
     again = json.loads((tmp_path / "r.json").read_text())
     assert again["kinds"] == found["kinds"]
+
+
+@pytest.mark.parametrize("name", ["W7", "W7-filters"])
+def test_a_line_that_does_not_hold_is_marked(name):
+    """As many marks as lines that are missing."""
+    numbers = verdicts.judge(next(c for c in verdicts.claims() if c["id"] == name)).numbers
+    hold, of = map(int, numbers["lines that hold"].split(" of "))
+    assert "".join(map(str, numbers.values())).count("(missed)") == of - hold > 0

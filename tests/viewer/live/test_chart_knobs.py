@@ -59,7 +59,7 @@ def test_a_point_stands_where_its_number_is():
 
 def test_what_makes_no_chart_is_refused(monkeypatch):
     monkeypatch.setenv("MOTIONLAB_VIEWER", "page")
-    with pytest.raises(ViewerError, match="two or more in rising order"):
+    with pytest.raises(ViewerError, match="two or more numbers in rising order"):
         chart_knobs(make, {"shift": (1.0,)}, **settings())
     with pytest.raises(ViewerError, match="61 settings are too many"):
         chart_knobs(make, {"shift": tuple(range(61))}, **settings())

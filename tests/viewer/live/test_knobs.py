@@ -72,6 +72,24 @@ def test_a_slider_reaches_every_value_of_a_page(box):
         assert (value / slider.step) % 1 == pytest.approx(0, abs=1e-6)
 
 
+def test_words_are_a_list_to_choose_from(monkeypatch):
+    """In any order; the function is given the word."""
+    values = {"who": ("the walk", "a < b", "again")}
+    which = lambda who: make(0.1 * len(who), False)
+    box = knobs(which, values, start={"who": "again"})
+    field = fields(box)["who"]
+    assert field.options == values["who"] and field.value == "again"
+    field.value = "a < b"
+    assert box.children[2].value == "rise 0.5, still False"
+    monkeypatch.setenv("MOTIONLAB_VIEWER", "page")
+    text = knobs(which, values, start={"who": "again"})._repr_html_()
+    assert '<option value="1">a &lt; b</option><option value="2" selected>again</option>' in text
+    assert 'class="said" aria-live="polite">rise 0.5, still False</output>' in text
+    for bad in (("one", "one"), ("one", 2.0)):
+        with pytest.raises(ViewerError, match="different words"):
+            knobs(which, {"who": bad})
+
+
 def test_what_cannot_be_made_is_said_and_the_last_motion_stays():
     def picky(rise):
         if rise > 0.2:

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 from ...errors import ViewerError
 from ..pictures.palette import color
 from .figure import PageFigure
-from .knobs import FOLLOWED, MOST, SETTINGS, STYLE, check_knobs, page_input
-from .knobs_kernel import knob_field
+from .knobs import FOLLOWED, MOST, SETTINGS, STYLE, check_knobs, named, page_input
+from .knobs_kernel import Value, knob_field
 
 WIDE, ROW, LEFT = 440, 34, 84  # of the chart, in its own units
 _PAGE = (
@@ -52,11 +52,11 @@ class Bar(NamedTuple):
 
 def chart_knobs(
     make: Callable[..., tuple[Sequence[Bar], str]],
-    values: Mapping[str, Sequence[float]],
+    values: Mapping[str, Sequence[Value]],
     *,
     ends: tuple[float, float],
     unit: str,
-    start: Mapping[str, float] | None = None,
+    start: Mapping[str, Value] | None = None,
     labels: Mapping[str, str] | None = None,
     caption: str | None = None,
 ) -> Any:
@@ -79,7 +79,7 @@ def chart_knobs(
     return _box(shown, values, start, called, caption)
 
 
-def _made(make: Callable, wanted: Mapping[str, float], ends, unit: str) -> tuple[str, str]:
+def _made(make: Callable, wanted: Mapping[str, Value], ends, unit: str) -> tuple[str, str]:
     bars, said = make(**wanted)
     return chart(bars, ends, unit), said
 
@@ -134,7 +134,7 @@ def _page(shown, values, start, called, caption) -> PageFigure:
     }
     first = [some.index(start[name]) for name, some in values.items()]
     drawn, said = made[",".join(map(str, first))]
-    names = [[f"{value:g}" for value in some] for some in values.values()]
+    names = named(values)
     return PageFigure(
         _PAGE.format(
             key=f"chart-{uuid.uuid4().hex[:8]}",

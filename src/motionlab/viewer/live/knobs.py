@@ -21,7 +21,7 @@ from ...errors import ViewerError
 from ...motion import Motion
 from ..pictures.palette import check_color
 from .figure import PageFigure
-from .knobs_kernel import box, is_box
+from .knobs_kernel import Value, box, is_box, is_list
 from .player import Track, page_html, payload
 from .show import still_picture, trail_points
 
@@ -40,9 +40,10 @@ SETTINGS = """<div class="turn">{inputs}</div>
 (() => {{
   const box = document.getElementById("{key}");
   const [names, made] = {made};
-  const inputs = [...box.querySelectorAll(".turn input")];
+  const inputs = [...box.querySelectorAll(".turn :is(input, select)")];
+  const place = (i) => i.type === "checkbox" ? Number(i.checked) : Number(i.value);
   const draw = () => {{
-    const at = inputs.map((i) => i.type === "checkbox" ? Number(i.checked) : i.valueAsNumber);
+    const at = inputs.map(place);
 """
 FOLLOWED = """    inputs.forEach((input, i) => {{
       if (input.type === "range") input.nextElementSibling.textContent = names[i][at[i]];
@@ -75,9 +76,9 @@ _PAGE = (
 
 def knobs(
     make: Callable[..., tuple[Motion, str]],
-    values: Mapping[str, Sequence[float]],
+    values: Mapping[str, Sequence[Value]],
     *,
-    start: Mapping[str, float] | None = None,
+    start: Mapping[str, Value] | None = None,
     labels: Mapping[str, str] | None = None,
     trail: str | int | Sequence[str | int] | None = None,
     color: str = "RNN",
@@ -90,8 +91,8 @@ def knobs(
     ----------
     make : takes one value of each name in `values`; gives a Motion, whose contacts are marked if it
         has any, and a line of text to say below it. All its motions have one rate.
-    values : {argument: values in rising order}; (False, True) is a box to tick. In a kernel a slider
-        has any value from the first to the last, in a page these.
+    values : {argument: values in rising order}; (False, True) is a box to tick, words a list to
+        choose from. In a kernel a slider has any value from the first to the last, in a page these.
     start : where knobs stand at first; else at the first value.
     labels : what knobs are called, with units; else as the arguments.
     trail : joints (names, roles or point indices) that leave a trail.
@@ -101,7 +102,7 @@ def knobs(
 
     Raises
     ------
-    ViewerError : a knob without two rising values, a start that is not among them, more than 60
+    ViewerError : a knob without two rising numbers or two different words, a start that is not among them, more than 60
         settings in a page, or a `make` that gives something else.
     """
     values, start, called = check_knobs(values, start, labels)
@@ -113,18 +114,20 @@ def knobs(
 
 
 def check_knobs(
-    values: Mapping[str, Sequence[float]],
-    start: Mapping[str, float] | None,
+    values: Mapping[str, Sequence[Value]],
+    start: Mapping[str, Value] | None,
     labels: Mapping[str, str] | None,
-) -> tuple[dict[str, tuple], dict[str, float], dict[str, str]]:
+) -> tuple[dict[str, tuple], dict[str, Value], dict[str, str]]:
     """Values, starts and labels of knobs, whole; raises ViewerError."""
     values = {name: tuple(some) for name, some in values.items()}
     start = {name: some[0] for name, some in values.items() if some} | dict(start or {})
     for name, some in values.items():
-        if len(some) < 2 or list(some) != sorted(set(some)) or start[name] not in some:
+        words = {isinstance(value, str) for value in some}
+        rising = words == {True} or (words == {False} and list(some) == sorted(some))
+        if len(set(some)) < max(2, len(some)) or not rising or start[name] not in some:
             raise ViewerError(
                 f"knobs: {name} has the values {some} and starts at {start.get(name)}; give two or "
-                "more in rising order, and start at one of them."
+                "more numbers in rising order, or different words, and start at one of them."
             )
     if not values or set(start) != set(values):
         raise ViewerError(f"knobs: values for {list(values)}, start for {list(start)}.")
@@ -151,7 +154,7 @@ def _page(make, values, start, called, caption, trail, color, height) -> PageFig
         tracks, fps, trail=trail_points(trail, tracks), height=height, overlay=False, follow=True,
         autoplay=True, choose="setting", chosen=chosen,
     )  # fmt: skip
-    names = [[f"{value:g}" for value in some] for some in values.values()]
+    names = named(values)
     return PageFigure(
         _PAGE.format(
             key=f"knobs-{uuid.uuid4().hex[:8]}",
@@ -164,18 +167,30 @@ def _page(make, values, start, called, caption, trail, color, height) -> PageFig
     )
 
 
-def page_input(label: str, some: Sequence[float], at: int, names: Sequence[str]) -> str:
-    """A knob of a page: a box, or a slider over the numbers of its values."""
+def named(values: Mapping[str, Sequence[Value]]) -> list[list[str]]:
+    """What a page calls the values of each knob."""
+    call = lambda value: value if isinstance(value, str) else f"{value:g}"
+    return [[call(value) for value in some] for some in values.values()]
+
+
+def page_input(label: str, some: Sequence[Value], at: int, names: Sequence[str]) -> str:
+    """A knob of a page: a box, a list of words, or a slider over the numbers of its values."""
     if is_box(some):
         ticked = " checked" if at else ""
         return f'<label><input type="checkbox" autocomplete="off"{ticked}> {html.escape(label)}</label>'
+    if is_list(some):
+        options = "".join(
+            f'<option value="{i}"{" selected" if i == at else ""}>{html.escape(name)}</option>'
+            for i, name in enumerate(names)
+        )
+        return f'<label>{html.escape(label)} <select autocomplete="off">{options}</select></label>'
     return (
         f'<label>{html.escape(label)} <input type="range" autocomplete="off" min="0" '
         f'max="{len(some) - 1}" value="{at}"><output>{names[at]}</output></label>'
     )
 
 
-def made_of(make: Callable, wanted: Mapping[str, float], color: str) -> tuple[Track, float, str]:
+def made_of(make: Callable, wanted: Mapping[str, Value], color: str) -> tuple[Track, float, str]:
     """What is shown of one setting: a track, its rate, and a line of text."""
     found = make(**wanted)
     match found:

@@ -13,11 +13,13 @@ from .dream_kernel import LAYOUT, STYLE
 from .player import Player, Track, payload
 from .show import trail_points
 
+Value = float | str  # of a knob: a number, yes or no, or a word
+
 
 def box(
-    shown: Callable[[Mapping[str, float]], tuple[Track, float, str]],
-    values: Mapping[str, Sequence[float]],
-    start: Mapping[str, float],
+    shown: Callable[[Mapping[str, Value]], tuple[Track, float, str]],
+    values: Mapping[str, Sequence[Value]],
+    start: Mapping[str, Value],
     called: Mapping[str, str],
     caption: str | None,
     trail: Any,
@@ -53,16 +55,23 @@ def box(
     return ipywidgets.VBox([player, ipywidgets.VBox(list(fields.values())), said, needs])
 
 
-def is_box(some: Sequence[float]) -> bool:
+def is_box(some: Sequence[Value]) -> bool:
     """Is a knob a box to tick?"""
     return all(isinstance(value, bool) for value in some)
 
 
-def knob_field(label: str, some: Sequence[float], value: float) -> ipywidgets.DOMWidget:
-    """A box to tick, or a slider, which counts when it is let go."""
+def is_list(some: Sequence[Value]) -> bool:
+    """Is a knob a list of words to choose from?"""
+    return all(isinstance(value, str) for value in some)
+
+
+def knob_field(label: str, some: Sequence[Value], value: Value) -> ipywidgets.DOMWidget:
+    """A box to tick, a list of words, or a slider, which counts when it is let go."""
     common = {"description": label, "style": STYLE, "layout": LAYOUT}
     if is_box(some):
         return ipywidgets.Checkbox(value=value, **common)
+    if is_list(some):
+        return ipywidgets.Dropdown(value=value, options=some, **common)
     step = 10.0 ** math.floor(math.log10((some[-1] - some[0]) / 20))
     return ipywidgets.FloatSlider(
         value=value, min=some[0], max=some[-1], step=step, continuous_update=False, **common
