@@ -95,6 +95,7 @@ def copied(book: Path, to: Path, page: str, name: str, script: str) -> None:
     """The book with another player; its `page` as that player reads it, or without figures."""
     shutil.copytree(book, to, dirs_exist_ok=True)
     text = (book / page).read_text(encoding="utf-8")
+    text = text.replace('"at_once":true', '"at_once":false')  # a network takes memory: if asked for
     if name == "none":
         text = FIGURES.sub("", text)
     elif name == "older":

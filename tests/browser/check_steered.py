@@ -9,6 +9,8 @@ WITHIN = 0.6  # radians off the way that is asked, by which he obeys
 OFF = """f => Math.max(...f.motionlab.steered.characters.map(({ before: { going } }) =>
   Math.abs(Math.atan2(Math.sin(going.bearing - Math.PI / 2), Math.cos(going.bearing - Math.PI / 2)))))"""
 
+ASK = "all => all.filter(button => !button.disabled && !button.hidden).forEach(button => button.click())"
+
 
 def check_steered(visit, patience: float) -> None:
     """Every character of a page turns to the left when he is asked to; `visit` is check_book's."""
@@ -16,7 +18,9 @@ def check_steered(visit, patience: float) -> None:
         figure, name = visit.page.locator(STEERED).nth(number), f"steered {number + 1}"
         figure.scroll_into_view_if_needed()
         try:
-            figure.get_by_role("button", name="Load the network").click(timeout=patience)
+            button = figure.get_by_role("button", name="Load the network", include_hidden=True)
+            button.first.wait_for(state="attached", timeout=patience)
+            button.evaluate_all(ASK)  # some figures load theirs by themselves
             figure.and_(visit.page.locator("[data-live]")).wait_for(timeout=patience)
         except TimeoutError:
             said = figure.locator("p[role=status]").all_inner_texts()

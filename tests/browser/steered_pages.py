@@ -37,6 +37,7 @@ def write_pages(folder: Path) -> None:
         "page": page_figure([(tiny, None), shipped], (), LOOK, "Steered"),
         "shipped": page_figure([shipped], (), LOOK),
         "beside": page_figure([(tiny, None)], (1, 3), LOOK),
+        "at_once": page_figure([(tiny, None)], (), LOOK, at_once=True),
     }
     for name, figure in pages.items():
         for script in (figure.weights, *figure.others):

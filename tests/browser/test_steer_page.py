@@ -50,6 +50,28 @@ def test_until_a_hand_steers_it_is_told_how(visit):
     assert value(page, "commands.used") is True
 
 
+def test_one_that_loads_by_itself_leaves_the_keys_to_the_page(visit):
+    """In sight it is loaded; arrow keys scroll until the picture is clicked, then they steer."""
+    page = visit("at_once.html").page
+    page.wait_for_selector("figure[data-live]", timeout=PATIENCE)
+    page.locator("p[role=status]").filter(has_text="Click the picture, and").wait_for(timeout=PATIENCE)  # fmt: skip
+    assert page.evaluate("document.activeElement === document.body")
+    page.keyboard.press("ArrowUp")
+    assert value(page, "commands.used") is False
+    page.locator("figure canvas").click(position={"x": 60, "y": 60})
+    page.keyboard.down("ArrowUp")
+    until(page, "figure.commands.used")
+    page.keyboard.up("ArrowUp")
+
+
+def test_who_wants_little_motion_is_asked_first(visit):
+    page = visit("at_once.html", reduced_motion="reduce").page
+    button = page.get_by_role("button", name="Load the network")
+    button.wait_for(timeout=PATIENCE)
+    page.wait_for_timeout(500)  # in which it would have been disabled
+    assert button.is_enabled() and page.locator("figure[data-live]").count() == 0
+
+
 def test_pictures_that_come_late_are_told(visit):
     page = visit().page
     load(page)

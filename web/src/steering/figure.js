@@ -16,6 +16,7 @@ const OF_HANDS = ["speed", "direction", "onward"]; // settings of what is asked;
 const NEAR = [...OF_HANDS, "help", "lock", "refined"]; // those that stand right below the picture, where a thumb is
 const ROOMY = "(min-width: 481px)"; // a window in which all of them do
 
+const CLICK = "Click the picture, and: ";
 const BEGIN = "Hold an arrow key, or W, A, S or D, to walk that way, with Shift to run. Or drag the stick in the picture.";
 
 const make = (tag, className, text = "") => Object.assign(document.createElement(tag), { className, textContent: text });
@@ -32,6 +33,18 @@ export class SteerFigure {
     figure.dataset.mlTheme = currentTheme();
     this.stage.addEventListener("motionlab:frame", () => this.lines && this.tell());
     this.choose(0);
+    if (content.at_once) this.loadInSight();
+  }
+
+  /** Without being asked, as soon as it is in sight; not for who saves data or wants little motion. */
+  loadInSight() {
+    if (navigator.connection?.saveData || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    const sight = new IntersectionObserver((entries) => {
+      if (!entries.some(({ isIntersecting }) => isIntersecting)) return;
+      sight.disconnect();
+      if (!this.go.disabled && !this.steered) this.load({ focus: false });
+    });
+    sight.observe(this.stage);
   }
 
   /** Take one of the networks; until it is loaded there is a clip of it. */
@@ -97,7 +110,8 @@ export class SteerFigure {
     this.stage.append(this.panel);
   }
 
-  async load() {
+  /** Whoever asked for it steers at once; keys of a page that is read stay its own. */
+  async load({ focus = true } = {}) {
     const { network, content: { beside, height, kept } } = this;
     this.go.disabled = true;
     this.say("Loading …");
@@ -115,7 +129,7 @@ export class SteerFigure {
     this.show((host) => new SteerPlayer(host, payload, this.still, this.steered, this.commands));
     this.setLive(true);
     this.look();
-    this.player.canvas.focus({ preventScroll: true });
+    if (focus) this.player.canvas.focus({ preventScroll: true });
     this.figure.dataset.live = "";
     this.tell();
     this.tellCost();
@@ -178,7 +192,8 @@ export class SteerFigure {
     const [first] = this.steered.records;
     const notes = first?.notes.length ? ` Not met: ${first.notes.join("; ")}.` : "";
     const begun = this.commands.used || notes || this.source.failed;
-    this.say(begun ? `${this.source.cost(this.steered, pace)}${notes}` : BEGIN);
+    const begin = this.figure.contains(document.activeElement) ? BEGIN : `${CLICK}${BEGIN}`;
+    this.say(begun ? `${this.source.cost(this.steered, pace)}${notes}` : begin);
   }
 
   say(text) {

@@ -28,6 +28,7 @@ def steer(
     color: str = "RNN",
     caption: str | None = None,
     height: int = 420,
+    at_once: bool = False,
 ) -> Any:
     """A character who goes where arrow keys, a stick or a gamepad lead him, and what can be seen of how.
 
@@ -52,6 +53,8 @@ def steer(
     color : a method's name or a colour.
     caption : a text below the figure.
     height : of the picture, pixels.
+    at_once : load a page's network as soon as it is in sight; else when its reader asks for it. Who saves
+        data or wants little motion is asked in any case.
 
     Raises
     ------
@@ -61,5 +64,5 @@ def steer(
     look = Look(speed, futures, height, check_color(color))
     check_look(look, beside)
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
-        return steer_page.page_figure([(model, refiner), *others], beside, look, caption)
+        return steer_page.page_figure([(model, refiner), *others], beside, look, caption, at_once)
     return steer_kernel.widget(model, control, refiner, beside, look, caption)

@@ -27,11 +27,12 @@ def page_figure(
     beside: Sequence[int],
     look: Look,
     caption: str | None = None,
+    at_once: bool = False,
 ) -> NetworkFigure:
     """What `steer` is in a built page: no kernel, no server, also from disk.
 
     networks : (model, refiner) of those that the reader may take; the first is taken at first.
-    beside, caption : as of `steer`; look : the rest of it.
+    beside, caption, at_once : as of `steer`; look : the rest of it.
     """
     made = [_network(model, refiner, look) for model, refiner in networks]
     scripts, (tracks, *_) = [script for _, script, _ in made], [tracks for *_, tracks in made]
@@ -41,6 +42,7 @@ def page_figure(
         "beside": cast_of(beside, look.color),
         "height": look.height,
         "kept": KEPT,
+        "at_once": at_once,
         "restarts": ["start", "seed"],  # settings that can't change in the middle of a motion
     }
     still = still_picture(tracks[0])
