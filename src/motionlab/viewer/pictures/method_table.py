@@ -5,7 +5,7 @@
     method_table(found, part="cost")            # what it takes
 
 Rows are methods, the last is real against real motion. A star marks what is told apart from real motion: a
-value whose interval does not meet that of the floor. Long tables fold.
+value whose interval does not meet that of the floor.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import pandas as pd
 from ...errors import ViewerError
 
 FLOOR = "real against real"
-MOST = 12  # rows; a longer table is folded
 PARTS = ("motion", "forecasts", "cost")
 MISSING = "–"
 
@@ -26,19 +25,15 @@ MISSING = "–"
 class MethodTable:
     """Rows of text: `frame` is the DataFrame, `notes` say what is left out, and why."""
 
-    def __init__(self, frame: pd.DataFrame, notes: list[str], title: str) -> None:
-        self.frame, self.notes, self.title = frame, notes, title
+    def __init__(self, frame: pd.DataFrame, notes: list[str]) -> None:
+        self.frame, self.notes = frame, notes
 
     def __repr__(self) -> str:
         return "\n".join([self.frame.to_string(), *self.notes])
 
     def _repr_html_(self) -> str:
-        table = self.frame.to_html(border=1)
         said = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
-        if len(self.frame) <= MOST:
-            return table + said
-        title = html.escape(f"{self.title}: {len(self.frame)} rows")
-        return f"<details><summary>{title}</summary>{table}{said}</details>"
+        return self.frame.to_html(border=1) + said
 
 
 def method_table(found: Mapping, gait: str = "walk", part: str = "motion") -> MethodTable:
@@ -56,7 +51,7 @@ def method_table(found: Mapping, gait: str = "walk", part: str = "motion") -> Me
         raise ViewerError(f"gait is {gait!r}; the result has {', '.join(found['floor'])}.")
     if part == "cost":
         frame = pd.DataFrame({title: _cost(row, found) for title, row in found["rows"].items()}).T
-        return MethodTable(frame, _notes(found, ("256",)), "What it costs")
+        return MethodTable(frame, _notes(found, ("256",)))
     errors = lambda name: name.startswith("error")
     names = [name for name in found["columns"] if errors(name) == (part == "forecasts")]
     floor = found["floor"][gait]
@@ -67,7 +62,7 @@ def method_table(found: Mapping, gait: str = "walk", part: str = "motion") -> Me
     rows[FLOOR] = {name: _cell(floor.get(name), None) for name in names}
     short = {name: name.removeprefix("error, ") for name in names}
     frame = pd.DataFrame(rows).T.rename(columns=short)
-    return MethodTable(frame, _notes(found, names), f"{gait.capitalize()}, {part}")
+    return MethodTable(frame, _notes(found, names))
 
 
 def _cell(cell: Mapping | None, real: Mapping | None) -> str:
