@@ -11,6 +11,7 @@ value whose interval does not meet that of the floor.
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Mapping
 
 import pandas as pd
@@ -20,10 +21,12 @@ from ...errors import ViewerError
 FLOOR = "real against real"
 PARTS = ("motion", "forecasts", "cost")
 MISSING = "–"
+INTERVAL = re.compile(r"<td>(\S+) (\[.*?\])( \*)?</td>")
 
 
 class MethodTable:
-    """Rows of text: `frame` is the DataFrame, `notes` say what is left out, and why."""
+    """Rows of text: `frame` is the DataFrame, `notes` say what is left out, and why. In a page an interval
+    stands small below its value."""
 
     def __init__(self, frame: pd.DataFrame, notes: list[str]) -> None:
         self.frame, self.notes = frame, notes
@@ -33,7 +36,8 @@ class MethodTable:
 
     def _repr_html_(self) -> str:
         said = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
-        return self.frame.to_html(border=1) + said
+        table = self.frame.to_html(border=1)
+        return INTERVAL.sub(r"<td>\1\3<br><small>\2</small></td>", table) + said
 
 
 def method_table(found: Mapping, gait: str = "walk", part: str = "motion") -> MethodTable:
