@@ -308,14 +308,14 @@ export class Player {
     const cells = this.cells;
     const columns = gridColumns(cells.length, width / height);
     const rows = Math.ceil(cells.length / columns);
-    const views = cells.map((cell, i) => {
+    this.views = cells.map((cell, i) => {
       const middle = this.middle(cell, this.clock.time);
       const box = { x: ((i % columns) * width) / columns, y: (Math.floor(i / columns) * height) / rows, width: width / columns, height: height / rows };
       // Every view gets its turn with the one camera just before it is drawn.
       return { ...box, middle, floor: this.payload.floor, spread: this.spread, azimuth: this.azimuth, actors: cell.flatMap((k) => this.casts[k]), aim: () => this.orbit.aim(middle, box.width / box.height) };
     });
-    this.stage.draw(this.canvas, views, THEMES[this.theme], ratio);
-    this.label(views, cells);
+    this.stage.draw(this.canvas, this.views, THEMES[this.theme], ratio);
+    this.label(this.views, cells);
   }
 
   get spread() {

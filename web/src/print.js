@@ -1,25 +1,29 @@
 // On paper nothing moves: there a motion is a strip of moments.
-const MOMENTS = 6; // of one view; of several beside each other half as many, one below the other
-const WIDE = 0.62; // of a moment of one view, in its heights
+const MOMENTS = 6;
+const WIDE = 0.62; // of a moment whose body stays in the middle, in its heights
+const [TALL, PAPER] = [5, 22]; // centimetres of a row at most, and of all rows of a strip
 
-/** Put a strip, which is seen in print alone, behind the picture of a player that holds one. */
+/** Put a strip, which is seen in print alone, behind the picture of a player that holds one: a row for each view. */
 export function addStrip(player) {
   if (!player.casts || player.bare || player.clock.frames < 2) return;
-  const { clock } = player;
-  const [time, alone] = [clock.time, player.cells.length === 1];
-  const count = alone ? MOMENTS : MOMENTS / 2;
-  const strip = document.createElement("div");
-  strip.className = "ml-strip";
-  strip.style.setProperty("--ml-columns", alone ? count : 1);
-  for (let k = 0; k < count; k += 1) {
-    clock.seek(Math.round((k * (clock.frames - 1)) / (count - 1)));
+  const { clock, cells } = player;
+  const { time } = clock;
+  const middle = player.follow || cells.length === 1;
+  const rows = cells.map((cell) => [named(cell.map((i) => player.tracks[i].label).filter(Boolean).join(" and "))]);
+  const times = [named("")];
+  for (let k = 0; k < MOMENTS; k += 1) {
+    clock.seek(Math.round((k * (clock.frames - 1)) / (MOMENTS - 1)));
     player.draw();
-    strip.append(moment(player.canvas, alone, `${(clock.frame / clock.fps).toFixed(2)} s`));
+    const now = `${(clock.frame / clock.fps).toFixed(2)} s`;
+    player.views.forEach((view, i) => rows[i].push(moment(player, view, middle, `At ${now}`)));
+    times.push(named(now));
   }
   clock.time = time;
   player.dirty = true;
-  const names = player.cells.map((cell) => cell.map((i) => player.tracks[i].label).filter(Boolean).join(" and "));
-  if (names.some(Boolean)) strip.prepend(Object.assign(document.createElement("p"), { textContent: names.join(" · ") }));
+  const strip = Object.assign(document.createElement("div"), { className: "ml-strip" });
+  strip.style.setProperty("--ml-columns", MOMENTS);
+  strip.style.setProperty("--ml-tall", `${Math.min(TALL, PAPER / rows.length).toFixed(1)}cm`);
+  strip.append(...rows.flat(), ...times);
   player.view.after(strip);
 }
 
@@ -27,13 +31,15 @@ export function removeStrip(player) {
   player.host.querySelector(".ml-strip")?.remove();
 }
 
-/** What a canvas shows now, with the time below it; alone: its middle. */
-function moment(canvas, alone, time) {
-  const { height } = canvas;
-  const width = alone ? Math.min(canvas.width, Math.round(WIDE * height)) : canvas.width;
+const named = (textContent) => Object.assign(document.createElement("span"), { textContent });
+
+/** What is seen now in one of the views; `middle`: without what is left and right of the body. */
+function moment({ canvas, view: { clientWidth } }, view, middle, alt) {
+  const ratio = canvas.width / clientWidth;
+  const seen = middle ? Math.min(view.width, WIDE * view.height) : view.width;
+  const [width, height] = [seen * ratio, view.height * ratio].map(Math.round);
   const piece = Object.assign(document.createElement("canvas"), { width, height });
-  piece.getContext("2d").drawImage(canvas, (canvas.width - width) / 2, 0, width, height, 0, 0, width, height);
-  const figure = document.createElement("div");
-  figure.append(Object.assign(new Image(), { src: piece.toDataURL(), alt: `At ${time}` }), time);
-  return figure;
+  const left = ratio * (view.x + (view.width - seen) / 2);
+  piece.getContext("2d").drawImage(canvas, left, ratio * view.y, width, height, 0, 0, width, height);
+  return Object.assign(new Image(), { src: piece.toDataURL(), alt });
 }
