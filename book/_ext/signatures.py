@@ -12,6 +12,7 @@ from bs4 import BeautifulSoup, Tag
 from sphinx.application import Sphinx
 
 SIGNATURE = re.compile(r'<dt class="sig sig-object py".*?</dt>', re.DOTALL)
+FUNCTION = re.compile(r"<function ([\w.]+)[^>]*>")
 KEPT = {"sig-prename", "sig-name", "viewcode-link", "arguments", "parameter"}
 
 
@@ -21,11 +22,11 @@ def rewrite(body: str) -> str:
 
 
 def parsable(signature: str | None) -> str | None:
-    """A signature whose defaults are Python: a field that is made anew each time has "...".
+    """A signature whose defaults are Python: a function by its name, "..." for what is made anew.
 
-    Sphinx would give up on "<factory>", and write the whole of it as it stands.
+    Sphinx would give up on "<function wishes>" and "<factory>", and write the whole of it as it stands.
     """
-    return signature and signature.replace("<factory>", "...")
+    return signature and FUNCTION.sub(r"\1", signature).replace("<factory>", "...")
 
 
 def _signature(html: str) -> str:

@@ -73,7 +73,8 @@ def test_what_is_no_signature_stays(signatures):
     assert signatures.rewrite(body) == body
 
 
-def test_a_field_that_is_made_anew_each_time_can_be_parsed(signatures):
-    written = signatures.parsable("(rules: Rules = <factory>, fps: float = 30.0)")
+def test_defaults_that_are_no_python_can_be_parsed(signatures):
+    written = signatures.parsable("(rules: Rules = <factory>, wish: Wish = <function wishes>)")
+    assert written == "(rules: Rules = ..., wish: Wish = wishes)"
     ast.parse(f"def made{written}: pass")
     assert signatures.parsable(None) is None
