@@ -109,6 +109,12 @@ def test_what_is_no_method_has_colours_of_its_own(seen):
     assert not [p for p in combinations(palette.CYCLE, 2) if apart(*p, seen) < least]
 
 
+@pytest.mark.parametrize("seen", SEEN)
+def test_a_changed_motion_is_told_from_the_recorded_one(seen):
+    """Chapter 2 lays them over each other."""
+    assert apart(palette.COLORS["mocap"], palette.CYCLE[1], seen) > 15
+
+
 def test_no_two_things_have_one_colour():
     colors = [*palette.COLORS.values(), *palette.CYCLE]
     assert not [pair for pair in combinations(colors, 2) if apart(*pair) < 12]
