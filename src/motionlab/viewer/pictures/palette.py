@@ -27,8 +27,9 @@ COLORS = {
     "STRNN": "#e34e91",
     "PFNN": "#d11828",
 }
-# By turns, for what is not named after a method; "C0" is the first of them, as in matplotlib.
-CYCLE = ("#356f67", "#b08781", "#755e86", "#8e8f5f", "#786249", "#7a95a3")
+# By turns, for what is not named after a method; "C0" is the first of them, as in matplotlib. Slate and
+# earth first: plum and pine, whose hues are near those of GAN2+lock and GAN1, come last.
+CYCLE = ("#7a95a3", "#b08781", "#786249", "#8e8f5f", "#755e86", "#356f67")
 PATH = "#e3b93a"  # on the ground and the board, with a rim
 
 
@@ -54,5 +55,5 @@ def check_color(value: str, argument: str = "color") -> str:
     except (ValueError, TypeError) as error:
         raise ViewerError(
             f"{argument}: {value!r} is no colour. Use a method's name ({', '.join(COLORS)}), "
-            "a name matplotlib knows or a hex code such as '#356f67'."
+            "a name matplotlib knows or a hex code such as '#7a95a3'."
         ) from error
