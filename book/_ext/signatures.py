@@ -13,6 +13,7 @@ from sphinx.application import Sphinx
 
 SIGNATURE = re.compile(r'<dt class="sig sig-object py".*?</dt>', re.DOTALL)
 FUNCTION = re.compile(r"<function ([\w.]+)[^>]*>")
+NAMELESS = re.compile(r"<factory>|<function <lambda>[^>]*>")
 KEPT = {"sig-prename", "sig-name", "viewcode-link", "arguments", "parameter"}
 
 
@@ -22,11 +23,11 @@ def rewrite(body: str) -> str:
 
 
 def parsable(signature: str | None) -> str | None:
-    """A signature whose defaults are Python: a function by its name, "..." for what is made anew.
+    """A signature whose defaults are Python: a function by its name, "..." for what has none.
 
     Sphinx would give up on "<function wishes>" and "<factory>", and write the whole of it as it stands.
     """
-    return signature and FUNCTION.sub(r"\1", signature).replace("<factory>", "...")
+    return signature and FUNCTION.sub(r"\1", NAMELESS.sub("...", signature))
 
 
 def _signature(html: str) -> str:

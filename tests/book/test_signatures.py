@@ -74,7 +74,9 @@ def test_what_is_no_signature_stays(signatures):
 
 
 def test_defaults_that_are_no_python_can_be_parsed(signatures):
-    written = signatures.parsable("(rules: Rules = <factory>, wish: Wish = <function wishes>)")
-    assert written == "(rules: Rules = ..., wish: Wish = wishes)"
+    written = signatures.parsable(
+        "(rules: Rules = <factory>, wish: Wish = <function wishes>, enough=<function <lambda>>)"
+    )
+    assert written == "(rules: Rules = ..., wish: Wish = wishes, enough=...)"
     ast.parse(f"def made{written}: pass")
     assert signatures.parsable(None) is None
