@@ -92,7 +92,7 @@ def main(options: Options) -> None:
     model, refiner = motionlab.load("lstm-gmm-contacts"), motionlab.load("refiner-contacts")
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "page.html"
-        page_figure([(model, refiner)], (), Look(1.2, LIMITED, 200, "#d98324")).save(page)
+        page_figure([(model, refiner)], (), Look(1.2, LIMITED, 200, "#dc740a")).save(page)
         found = in_chromium(page, options.rounds, path)
         hand = by_hand(page, options.seconds, path)
     rows = []

@@ -1,7 +1,8 @@
-"""What tests share: real clips, where there are any; and at the end, what was not tested and why."""
+"""What tests share: real clips, where there are any, the book's extensions; and what was not tested and why."""
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import zipfile
 from collections import Counter
@@ -70,3 +71,19 @@ def _sample(folder: Path, source: str) -> dict[str, bytes]:
 
 def _pick(paths: list) -> list:
     return [paths[0], paths[len(paths) // 2], paths[-1]]
+
+
+@pytest.fixture(scope="session")
+def extension():
+    """An extension of Sphinx in book/_ext by its name, which may be that of another module."""
+
+    def load(name):
+        for package in ("sphinx", "bs4"):
+            pytest.importorskip(package)
+        path = Path(__file__).parents[1] / "book" / "_ext" / f"{name}.py"
+        spec = importlib.util.spec_from_file_location(name, path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    return load

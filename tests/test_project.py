@@ -234,28 +234,52 @@ def public_modules() -> set[str]:
     return set(MODULES) - packages
 
 
+BOOK = ROOT / "book"
+REFERENCE = {
+    path.relative_to(BOOK).as_posix(): path.read_text(encoding="utf-8")
+    for path in (BOOK / "api.md", *sorted((BOOK / "api").glob("*.md")))
+}
+
+
 def test_reference_names_every_public_module():
-    text = (ROOT / "book" / "api.md").read_text(encoding="utf-8")
+    text = "\n".join(REFERENCE.values())
     named = set(re.findall(r"auto\w+:: motionlab\.(\S+)", text))
     internal = set(re.search(r"% inner modules, not for readers: (.*)", text)[1].split())
     missing = {m for m in public_modules() - internal if m not in named}
     missing = {m for m in missing if not any(n.startswith(m + ".") for n in named)}
-    assert not missing, f"book/api.md has no section for {sorted(missing)}"
+    assert not missing, f"no page in book/api has a section for {sorted(missing)}"
+
+
+def test_index_of_the_reference_leads_to_every_page_and_to_names_on_it():
+    rows = re.findall(r"^\| \[\]\((api/\w+\.md)\) \| .+ \| (.+) \|$", REFERENCE["api.md"], re.M)
+    assert sorted(page for page, _ in rows) == sorted(REFERENCE.keys() - {"api.md"})
+    toc = (BOOK / "_toc.yml").read_text(encoding="utf-8")
+    for page, cell in rows:
+        assert f"- file: book/{page.removesuffix('.md')}\n" in toc
+        written = re.findall(r"auto\w+:: (\S+)", REFERENCE[page])
+        for name in re.findall(r"`~(\S+)`", cell):
+            module, _, short = name.rpartition(".")
+            there = module in written and hasattr(importlib.import_module(module), short)
+            assert there or name in written, f"{name} is not on {page}"
 
 
 def test_functions_of_the_reference_are_where_it_says():
     """As one writes them after `import motionlab`, whatever file they stand in."""
-    text = (ROOT / "book" / "api.md").read_text(encoding="utf-8")
-    names = re.findall(r"autofunction:: motionlab\.(\S+)", text)
+    names = re.findall(r"autofunction:: motionlab\.(\S+)", "\n".join(REFERENCE.values()))
     assert {"contacts.label", "solvers.lock_feet", "viewer.show", "viewer.plots.curves"} <= {*names}
     for name in names:
-        found, path = motionlab, "motionlab"
-        for part in name.split("."):
-            path += f".{part}"
-            if not hasattr(found, part):
-                importlib.import_module(path)
-            found = getattr(found, part)
-        assert callable(found), name
+        assert callable(find_public(f"motionlab.{name}")), name
+
+
+def find_public(name: str) -> object:
+    """What a dotted name leads to from `import motionlab`, with modules imported on the way."""
+    found, path = motionlab, "motionlab"
+    for part in name.split(".")[1:]:
+        path += f".{part}"
+        if not hasattr(found, part):
+            importlib.import_module(path)
+        found = getattr(found, part)
+    return found
 
 
 EXAMPLE = re.compile(r">>> (?!.*doctest: \+SKIP)")  # one of them needs a slider that is on a page
@@ -268,15 +292,17 @@ def test_examples_of_the_reference_run(name):
     assert tried.failed == 0 and tried.attempted
 
 
-def test_the_example_at_the_head_of_the_reference_runs(tmp_path, monkeypatch):
+def test_examples_between_the_lines_of_the_reference_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     motionlab.write_bvh(motionlab.datasets.gaits.make(seconds=1), "walk.bvh", units="cm")
-    examples = re.findall(
-        r"```python\n(.*?)```", (ROOT / "book" / "api.md").read_text("utf-8"), re.DOTALL
-    )
-    assert examples
-    for example in examples:
-        exec(compile(example, "book/api.md", "exec"), {})
+    shown = {
+        page: re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+        for page, text in REFERENCE.items()
+    }
+    assert shown["api.md"]
+    for page, examples in shown.items():
+        for example in examples:
+            exec(compile(example, page, "exec"), {})
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem)

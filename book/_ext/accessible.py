@@ -1,11 +1,11 @@
 """What Sphinx and its themes write that a screen reader can't make sense of, written anew.
 
 * "Show the code" is named "Toggle hidden content" to those who listen: they are to hear what is seen.
-* A long signature is a list of definitions without terms: plain lines instead.
 * References are a list whose entries are no list items: no list.
 * A picture without a name is called by its file's.
 * The search button is named "Search" and says "Search Ctrl+K"; the names of the colour button's
   pictures would do as well as its own.
+* What folds the pages of a subject in the sidebar has no name.
 * A table, a formula or a line of code that is wider than the page scrolls, but not by keys.
 
 What is left is seen by tests/browser/check_access.py.
@@ -16,9 +16,6 @@ from pathlib import Path
 
 from sphinx.application import Sphinx
 
-SIGNATURE = re.compile(
-    r'<dl>\s*(?P<lines>(?:<dd><em class="sig-param">.*?</dd>\s*)+)</dl>', re.DOTALL
-)
 UNNAMED = re.compile(r'alt="(\.\./)*_images/[0-9a-f]{32,}\.\w+"')
 REACHED = """
 addEventListener("DOMContentLoaded", () => {
@@ -44,24 +41,23 @@ BUTTONS = (
 )
 
 
+FOLD = '<summary><span class="toctree-toggle"'
+
+
 def buttons(page: str) -> str:
     """A whole page whose buttons are named as they are seen."""
     for names in BUTTONS:
         page = names.sub(r"\1", page)
-    return page
+    return page.replace(
+        FOLD, FOLD.replace("<summary>", '<summary aria-label="Pages of this subject">')
+    )
 
 
 def rewrite(body: str) -> str:
     """The same HTML without these faults."""
     body = body.replace('<summary aria-label="Toggle hidden content">', "<summary>")
     body = body.replace('<div role="list" class="citation-list">', '<div class="citation-list">')
-    body = UNNAMED.sub('alt="A picture that the code above draws"', body)
-    return SIGNATURE.sub(_as_lines, body)
-
-
-def _as_lines(found: re.Match) -> str:
-    lines = found["lines"].replace("<dd>", '<span class="parameter">').replace("</dd>", "</span>")
-    return f'<span class="parameters">{lines}</span>'
+    return UNNAMED.sub('alt="A picture that the code above draws"', body)
 
 
 def setup(app: Sphinx) -> dict:

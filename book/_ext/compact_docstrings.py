@@ -38,9 +38,18 @@ def rewrite(lines: list[str]) -> list[str]:
     return written
 
 
+def says_nothing(obj: object) -> bool:
+    """Whether it is a field of a named tuple, whose docstring is Python's own: its number."""
+    return (getattr(obj, "__doc__", None) or "").startswith("Alias for field number")
+
+
 def setup(app: Sphinx) -> dict:
     def process(app, what, name, obj, options, lines):
         lines[:] = rewrite(lines)
 
+    def skip(app, what, name, obj, skipped, options):
+        return True if says_nothing(obj) else None
+
     app.connect("autodoc-process-docstring", process)
+    app.connect("autodoc-skip-member", skip)
     return {"parallel_read_safe": True}

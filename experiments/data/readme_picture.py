@@ -18,7 +18,7 @@ def main(path: str) -> None:
     made = gaits.make(seconds=recorded.seconds, speed=1.3, seed=3)
     strips = [
         viewer.filmstrip(recorded[30:150], color="mocap"),
-        viewer.filmstrip(made[30:150], color="#d98324"),
+        viewer.filmstrip(made[30:150], color="RNN"),
     ]
     width = max(strip.width for strip in strips)
     page = Image.new("RGBA", (width, sum(strip.height for strip in strips)))

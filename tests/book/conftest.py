@@ -1,7 +1,6 @@
 """The tools in book/ import each other as scripts do: by name, from their own folder."""
 
 import importlib
-import importlib.util
 import sys
 from pathlib import Path
 
@@ -22,20 +21,5 @@ def tool():
             return importlib.import_module(name)
         finally:
             sys.path.remove(str(BOOK))
-
-    return load
-
-
-@pytest.fixture(scope="session")
-def extension():
-    """An extension of Sphinx in book/_ext by its name, which may be that of another module."""
-
-    def load(name):
-        for package in ("sphinx", "bs4"):
-            pytest.importorskip(package)
-        spec = importlib.util.spec_from_file_location(name, BOOK / "_ext" / f"{name}.py")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        return module
 
     return load

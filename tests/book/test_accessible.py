@@ -15,16 +15,6 @@ def test_what_is_heard_is_what_is_seen(accessible):
     assert accessible.rewrite(seen) == "<details><summary>\nShow the code</summary></details>"
 
 
-def test_a_long_signature_becomes_lines_and_other_lists_stay(accessible):
-    one, two = (f'<em class="sig-param"><span>{name}</span></em>' for name in ("fps", "up"))
-    other = "<dl><dt>word</dt><dd>what it means</dd></dl>"
-    body = f"{other}<dt>Motion(\n\n<dl>\n<dd>{one},</dd>\n<dd>{two},</dd>\n</dl>\n\n)</dt>{other}"
-    found = accessible.rewrite(body)
-    assert found.count("<dl>") == 2 and found.count(other) == 2
-    assert f'<span class="parameter">{one},</span>' in found
-    assert f'<span class="parameter">{two},</span>' in found
-
-
 def test_references_are_no_list(accessible):
     assert accessible.rewrite('<div role="list" class="citation-list">x</div>') == (
         '<div class="citation-list">x</div>'
@@ -51,3 +41,12 @@ def test_the_themes_buttons_are_named_as_they_are_seen(accessible):
         ' data-mode="light" title="Light"'
     )
     assert accessible.buttons(named) == search.format("") + colour.format(' data-mode="light"')
+
+
+def test_what_folds_pages_in_the_sidebar_has_a_name(accessible):
+    fold = "<details><summary>{}</summary></details>"
+    page = accessible.buttons(fold.format('<span class="toctree-toggle"><i></i></span>'))
+    assert page.startswith(
+        '<details><summary aria-label="Pages of this subject"><span class="toctree-toggle">'
+    )
+    assert accessible.buttons(fold.format("Show the code")) == fold.format("Show the code")

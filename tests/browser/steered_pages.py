@@ -21,7 +21,7 @@ PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><link rel="icon" 
 <meta name="viewport" content="width=device-width"><title>steer</title>
 <script src="player.js"></script><body style="margin: 8px">{}<p style="height: 2000px">.</p>
 <p id="end">end</p></body></html>"""
-LOOK = Look(1.2, 4, 240, "#d98324")
+LOOK = Look(1.2, 4, 240, "#dc740a")
 PATIENCE = 60_000  # milliseconds
 SECOND = 30  # frames
 

@@ -29,7 +29,7 @@ def kernel_page(visit, folder):
     """The widget's page; what a kernel would answer comes from the widget itself."""
     tiny = tiny_lstm(tiny_clips("walk_1.2", "run_3.0", "stand"))
     tiny.sampling = {"temperature": 0.3}
-    made = widget(tiny, LiveControl, None, (), Look(1.2, 4, 240, "#d98324"), "Steered")
+    made = widget(tiny, LiveControl, None, (), Look(1.2, 4, 240, "#dc740a"), "Steered")
     opened = open_widget(visit, folder, made)
     told: list[dict] = []
     made.send = told.append

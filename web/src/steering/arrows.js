@@ -2,7 +2,7 @@
 import { BufferGeometry, Float32BufferAttribute, Group, Mesh, MeshBasicMaterial } from "three";
 import { STILL } from "./aim.js";
 
-export const ASKED = "#5b5fc7";
+export const ASKED = "#755e86";
 const [NEAR, A_SPEED] = [0.32, 0.42]; // metres from the middle, and more for a m/s
 const [WIDE, HEAD] = [0.05, 0.13]; // metres, half a shaft and half a head
 const [ASKED_HEIGHT, DONE_HEIGHT] = [0.004, 0.007]; // metres above the floor, so that they don't fight

@@ -12,7 +12,7 @@ from ...encodings import JointAngles
 from ...errors import ViewerError, WayError
 from ...motion import Motion
 from ...paths import Path
-from ..pictures.palette import PATH
+from ..pictures.palette import CYCLE, PATH
 from .dream_settings import REFINED, Control, check_starts, sampled_tracks
 from .network_weights import check_refiner
 from .player import Track, payload
@@ -20,7 +20,7 @@ from .player import Track, payload
 SPEED = Control("speed", "Speed (m/s)", "Less in sharp bends", 0.4, 4, 0.1, 1.2)
 START = Control("start", "Start", "What the character does when the path begins", -1, 0, 1, -1)
 SEED = Control("seed", "Seed", "The same seed gives the same motion", 0, 9999, 1, 0)
-SOLVED = "#5b5fc7"  # of what was solved beforehand, beside what walks now
+SOLVED = CYCLE[4]  # of what was solved beforehand, beside what walks now
 MOST = 40  # paths that were solved beforehand
 FLOOR_SECONDS = 1.0
 

@@ -33,6 +33,7 @@ from ...io.gltf_mesh import rest_stands
 from ...motion import Motion
 from ...skeleton import Skeleton
 from ..pictures.body import Body, body
+from ..pictures.palette import COLORS
 
 STATIC = Path(__file__).parent / "static"
 ROOT_UNIT = 1e-4  # metres; an int32 reaches 214 km
@@ -51,7 +52,7 @@ class Track:
     positions: Tensor
     skeleton: Skeleton
     label: str = ""
-    color: str = "#9aa3ad"
+    color: str = COLORS["mocap"]
     contacts: Tensor | None = None  # bool (frames, 4)
     name: str = ""  # what a file is called that is saved of it
     motion: Motion | None = None  # with the rotations, where they are known

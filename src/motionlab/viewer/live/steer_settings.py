@@ -14,10 +14,11 @@ from ...feet.contacts import foot_points, rest_heights
 from ...feet.lock_stream import LockStream
 from ...metrics import broken
 from ...roles import SIDES
+from ..pictures.palette import CYCLE
 from .dream_settings import CONTROLS, REFINED, Control, check_starts
 from .network_weights import check_refiner
 
-COMPARED = ("#1d72b4", "#1f9e7a", "#c9689c")  # of characters beside the first
+COMPARED = CYCLE[:3]  # of characters beside the first
 CALMER = 0.6  # of the temperature at which a model ships, as of solvers.live_control
 SPEED = Control("speed", "Speed (m/s)", "What the arrow keys ask for; with Shift he runs", 0.4, 3.2,
                 0.1, 1.2)  # fmt: skip

@@ -1,32 +1,36 @@
-"""One colour per method through the whole book.
+"""One colour per method through the whole book, and others for what is no method.
 
-The hues are those of Okabe and Ito (2008), chosen to be told apart by colour-blind readers too, a
-little softened so that they sit on a white and on a black page alike. Mocap is always grey.
+Methods are bright, the cycle for all else is muted, mocap is grey. Every colour has a contrast of 3:1
+with a light and with a dark page; those that stand together differ for colour-blind readers, too
+(deuteranopia and protanopia as Machado, Oliveira and Fernandes 2009 model them; a test measures it).
 """
 
 from __future__ import annotations
 
+import re
+
 from ...errors import ViewerError
 
 COLORS = {
-    "mocap": "#9aa3ad",
-    "gaits": "#7f9bb3",
-    "RNN": "#d98324",
-    "GAN1": "#4aa8dc",
-    "GAN2": "#1d72b4",
-    "RNN+c": "#e3b93a",
-    "GAN2+lock": "#5b5fc7",
-    "acLSTM": "#1f9e7a",
-    "LSTM-3LR": "#8f9e3b",
-    "scheduled": "#7d8fd1",
-    "ERD": "#a6761d",
-    "seq2seq": "#8c6bb1",
-    "STRNN": "#c9689c",
-    "PFNN": "#c8503c",
+    "mocap": "#636669",
+    "gaits": "#4c6d8e",
+    "RNN": "#dc740a",
+    "GAN1": "#3a9fa6",
+    "GAN2": "#1588ee",
+    "RNN+c": "#8b6729",
+    "GAN2+lock": "#7d50b2",
+    "acLSTM": "#1e8f5a",
+    "LSTM-3LR": "#6989ca",
+    "scheduled": "#607226",
+    "ERD": "#ac8517",
+    "seq2seq": "#b47fa0",
+    "STRNN": "#e34e91",
+    "PFNN": "#d11828",
 }
-# Order for motions that are not named after a method.
-CYCLE = ("#4c86b8", "#d98324", "#1f9e7a", "#c9689c", "#e3b93a", "#5b5fc7", "#c8503c", "#9aa3ad")
-PATH = "#e3b93a"
+# By turns, for what is not named after a method; "C0" is the first of them, as in matplotlib. Slate and
+# earth first: plum and pine, whose hues are near those of GAN2+lock and GAN1, come last.
+CYCLE = ("#7a95a3", "#b08781", "#786249", "#8e8f5f", "#755e86", "#356f67")
+PATH = "#e3b93a"  # on the ground and the board, with a rim
 
 
 def color(name: str, index: int = 0) -> str:
@@ -38,16 +42,18 @@ def color(name: str, index: int = 0) -> str:
 
 
 def check_color(value: str, argument: str = "color") -> str:
-    """Give back a hex colour; method names and matplotlib's colour names are understood too.
+    """Give back a hex colour; method names, "C0" and matplotlib's other names are understood too.
 
     `argument` is what errors call it.
     """
     from matplotlib.colors import to_hex
 
+    if isinstance(value, str) and (turn := re.fullmatch(r"C(\d+)", value)):
+        return CYCLE[int(turn[1]) % len(CYCLE)]
     try:
         return COLORS[value] if value in COLORS else to_hex(value)
     except (ValueError, TypeError) as error:
         raise ViewerError(
             f"{argument}: {value!r} is no colour. Use a method's name ({', '.join(COLORS)}), "
-            "a name matplotlib knows or a hex code such as '#4c86b8'."
+            "a name matplotlib knows or a hex code such as '#7a95a3'."
         ) from error

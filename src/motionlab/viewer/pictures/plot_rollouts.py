@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
@@ -15,7 +14,7 @@ from ...errors import ViewerError
 from ...metrics import heading_frame
 from ...skeleton import Skeleton
 from . import palette
-from .plot_style import DASHES, check_named, styled
+from .plot_style import check_named, line_looks, styled
 
 
 @styled
@@ -30,22 +29,18 @@ def survival(lines: Mapping[str, Sequence[float]], horizon: float) -> Figure:
     Names that differ after a comma only have one colour, and other dashes.
     """
     check_named("survival", lines)
-    kinds = list(dict.fromkeys(name.partition(",")[0] for name in lines))
-    drawn: Counter[str] = Counter()
+    looks = line_looks([name.partition(",")[0] for name in lines])
     figure, axes = plt.subplots(figsize=(7.5, 3.6))
     first = horizon / 20_000
-    for name, seconds in lines.items():
-        kind = name.partition(",")[0]
+    for look, (name, seconds) in zip(looks, lines.items(), strict=True):
         seconds = np.sort(np.asarray(seconds, dtype=float))
         if not len(seconds) or not (seconds >= 0).all():  # NaN is not
             raise ViewerError(f"survival: {name!r} needs seconds of 0 or more; it has {seconds}.")
         failed = seconds[seconds <= horizon].clip(min=first)
         going = 1 - np.arange(len(failed) + 1) / len(seconds)
         axes.step(
-            [first, *failed, horizon], [*going, going[-1]], where="post", label=name,
-            color=palette.color(kind, kinds.index(kind)), lw=2, ls=DASHES[drawn[kind] % len(DASHES)],
-        )  # fmt: skip
-        drawn[kind] += 1
+            [first, *failed, horizon], [*going, going[-1]], where="post", label=name, lw=2, **look
+        )
     axes.set(xscale="log", xlim=(first, horizon), ylim=(-0.03, 1.03))
     axes.set(xlabel="time (s)", ylabel="share still going")
     axes.xaxis.set_major_formatter("{x:g}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sized
+from collections import Counter
+from collections.abc import Sequence, Sized
 from functools import wraps
 from numbers import Real
 from pathlib import Path
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 
 from ...errors import ViewerError
 from ...motion import Motion
+from . import palette
 
 STYLE = Path(__file__).with_name("style.mplstyle")
 # viridis without its ends, which vanish on a black or a white page
@@ -57,3 +59,16 @@ def check_named(plot: str, named: Sized) -> None:
 def check_rate(plot: str, fps: float) -> None:
     if not isinstance(fps, Real) or not 0 < fps < np.inf:
         raise ViewerError(f"{plot}: fps is {fps!r}; it must be a positive number.")
+
+
+def line_looks(kinds: Sequence[str]) -> list[dict[str, str]]:
+    """Colour and dashes of lines in their order: one colour a kind, other dashes for each further line of it.
+
+    kinds : what each line shows, such as the method; where colours run out, dashes tell them apart, too.
+    """
+    order, drawn, looks = list(dict.fromkeys(kinds)), Counter(), []
+    for kind in kinds:
+        color = palette.color(kind, order.index(kind))
+        looks.append({"color": color, "ls": DASHES[drawn[color] % len(DASHES)]})
+        drawn[color] += 1
+    return looks

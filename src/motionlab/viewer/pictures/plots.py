@@ -5,7 +5,6 @@ Every function returns a figure, transparent and legible on light and dark pages
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
@@ -19,12 +18,12 @@ from . import palette
 from .plot_rollouts import pauses, recurrence, survival
 from .plot_style import (
     AROUND_ZERO,
-    DASHES,
     INK,
     SPEED,
     check_motion,
     check_named,
     check_rate,
+    line_looks,
     styled,
 )
 from .take import check_frame
@@ -127,12 +126,8 @@ def curves(
     """
     check_named("curves", lines)
     figure, axes = plt.subplots()
-    drawn: Counter[str] = Counter()
-    for index, (name, (xs, ys)) in enumerate(lines.items()):
-        color = palette.color(name, index)
-        dashes = DASHES[drawn[color] % len(DASHES)]
-        axes.plot(xs, ys, "o", ls=dashes, label=name, color=color)
-        drawn[color] += 1
+    for look, (name, (xs, ys)) in zip(line_looks(list(lines)), lines.items(), strict=True):
+        axes.plot(xs, ys, "o", label=name, **look)
     if log == "x":
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
@@ -184,10 +179,9 @@ def over_time(
     check_named("over_time", lines)
     check_rate("over_time", fps)
     figure, axes = plt.subplots(figsize=(7.5, 3.2))
-    for index, (name, values) in enumerate(lines.items()):
+    for look, (name, values) in zip(line_looks(list(lines)), lines.items(), strict=True):
         values = np.asarray(values, dtype=float)
-        color = palette.color(name, index)
-        axes.plot(np.arange(len(values)) / fps, values, label=name, color=color)
+        axes.plot(np.arange(len(values)) / fps, values, label=name, **look)
     axes.set(xlabel="time (s)", ylabel=y)
     if log:
         axes.set_yscale("log", nonpositive="mask")
