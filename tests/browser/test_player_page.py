@@ -205,6 +205,24 @@ def test_a_slider_chooses_which_motion_is_seen(browser, page_file):
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+def test_a_camera_that_looks_at_the_feet_stands_near_them(browser, page_file):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOTIONLAB_VIEWER", "page")
+        figures = [show(waving(), focus=focus, height=240) for focus in ("body", "feet")]
+    file = page_file.with_name("focus.html")
+    file.write_text(PAGE.format("".join(figure.html for figure in figures)), encoding="utf-8")
+    orbits = "[...document.querySelectorAll('figure')].map((f) => f.motionlab.orbit)"
+    stands = f"{orbits}.map((o) => [o.distance, o.controls.target.y])"
+    with opened(browser, file) as page:
+        page.wait_for_selector("canvas")
+        (far, hips), (near, ankles) = page.evaluate(stands)
+        assert 0 < near < far / 2 and 0 < ankles < hips / 2
+        page.locator("canvas").nth(1).press("+")
+        assert page.evaluate(stands)[1][0] < near
+        page.locator("canvas").nth(1).press("r")  # back to where it stood at first
+        assert page.evaluate(stands)[1] == pytest.approx([near, ankles], rel=1e-3)
+
+
 def test_knobs_change_the_motion_and_what_is_said_of_it(browser, page_file):
     def make(rise, wide):
         motion = waving() if wide else waving()[:100]

@@ -265,7 +265,9 @@ export class Player {
     const azimuth = keepAngle ? Math.atan2(arm.x, arm.z) : this.azimuth;
     const cells = this.payload.choose ? this.tracks.map((_, i) => [i]) : this.cells;
     const room = Math.max(...cells.map((cell) => this.room(cell)));
-    this.orbit.place(azimuth, 2.45 * this.tall + 1.7 * room, this.payload.floor + 0.5 * this.tall);
+    // As a share of the body's height: where it looks, and of the way to it, how near it goes.
+    const [middle, near] = this.payload.focus === "feet" ? [0.14, 0.4] : [0.5, 1];
+    this.orbit.place(azimuth, near * (2.45 * this.tall + 1.7 * room), this.payload.floor + middle * this.tall);
     this.dirty = true;
   }
 

@@ -343,6 +343,7 @@ POINTS = standing(5).positions()
         (((standing(2),), {"choose": "weight"}), "two motions or more"),
         ((([standing(2)] * 3,), {"choose": "weight", "overlay": True}), "not overlaid"),
         ((([standing(2)] * 3,), {"choose": "weight", "chosen": 3}), "chosen is 3"),
+        (((standing(2),), {"focus": "toes"}), "'body' or 'feet'"),
     ],
 )
 def test_bad_arguments_say_what_and_what_to_do(arguments, says):

@@ -33,6 +33,7 @@ def show(
     overlay: bool = False,
     choose: str | None = None,
     chosen: int = 0,
+    focus: str = "body",
     caption: str | None = None,
     height: int = 380,
     skeleton: Skeleton | None = None,
@@ -62,6 +63,7 @@ def show(
     choose : name of a slider by which one motion is seen at a time, such as "weight"; its values are
         the labels.
     chosen : number of the motion that is seen at first, then.
+    focus : "body", or "feet": at first the camera stands near the ground and sees the legs alone.
     caption : a text below the player.
     height : of the picture, pixels.
     skeleton, fps : of point positions; needed for those only.
@@ -86,6 +88,8 @@ def show(
     rate = _rate(motions, fps)
     if not isinstance(height, int | np.integer) or not 120 <= height <= 2000:
         raise ViewerError(f"show: height is {height!r}; give pixels, from 120 to 2000.")
+    if focus not in ("body", "feet"):
+        raise ViewerError(f"show: focus is {focus!r}; give 'body' or 'feet'.")
     if choose is not None:
         if overlay or len(tracks) < 2 or not 0 <= chosen < len(tracks):
             raise ViewerError(
@@ -101,6 +105,7 @@ def show(
         overlay=bool(overlay),
         follow=True,
         autoplay=bool(autoplay),
+        **({} if focus == "body" else {"focus": focus}),
         **({} if choose is None else {"choose": str(choose), "chosen": int(chosen)}),
     )
     if os.environ.get("MOTIONLAB_VIEWER") == "page" if page is None else page:
