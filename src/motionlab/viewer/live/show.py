@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from ...errors import ViewerError
 from ...motion import Motion
 from ...skeleton import Skeleton
 from ..pictures.palette import PATH, check_color, color
+from .chart import chart_of
 from .figure import PageFigure
 from .player import Player, Track, page_html, payload
 
@@ -34,6 +35,9 @@ def show(
     choose: str | None = None,
     chosen: int = 0,
     focus: str = "body",
+    chart: Mapping[str, Sequence[float]] | None = None,
+    chart_label: str | None = None,
+    chart_log: bool = False,
     caption: str | None = None,
     height: int = 380,
     skeleton: Skeleton | None = None,
@@ -64,6 +68,9 @@ def show(
         the labels.
     chosen : number of the motion that is seen at first, then.
     focus : "body", or "feet": at first the camera stands near the ground and sees the legs alone.
+    chart : named lines of one value a frame, below the picture, with a cursor that follows the player
+        and can be dragged; NaN leaves a gap.
+    chart_label, chart_log : what the lines are and their unit; a logarithmic axis.
     caption : a text below the player.
     height : of the picture, pixels.
     skeleton, fps : of point positions; needed for those only.
@@ -96,6 +103,8 @@ def show(
                 f"show: choose={choose!r} is a slider over two motions or more, not overlaid, and "
                 f"chosen one of their numbers; there are {len(tracks)}, chosen is {chosen}."
             )
+    longest = max(len(track.positions) for track in tracks)
+    lines = chart_of(chart_label, chart, longest, chart_log)
     data = payload(
         tracks,
         rate,
@@ -106,6 +115,7 @@ def show(
         follow=True,
         autoplay=bool(autoplay),
         **({} if focus == "body" else {"focus": focus}),
+        **({} if lines is None else {"chart": lines}),
         **({} if choose is None else {"choose": str(choose), "chosen": int(chosen)}),
     )
     if os.environ.get("MOTIONLAB_VIEWER") == "page" if page is None else page:
