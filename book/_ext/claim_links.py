@@ -59,13 +59,13 @@ def told() -> dict[str, tuple[str, str]]:
 def table(chapter: int) -> list[str]:
     """Lines of a table in Markdown: the claims of a chapter and their verdicts."""
     rows = [
-        f"| {claim['id']} | {claim['claim']} | [{ruling}]{{.verdict .{badge}}} {remark} |"
+        f"| {claim['id']} | {claim['claim']} [{ruling}]{{.verdict .{badge}}} {remark} |"
         for claim, ruling, badge, remark in judged()
         if claim.get("chapter") == chapter
     ]
     if not rows:
         raise ValueError(f"no claim is told in chapter {chapter}")
-    return ["| | the paper's claim | here |", "|---|---|---|", *rows]
+    return ["| | what is claimed, and what became of it here |", "|---|---|", *rows]
 
 
 class Verdicts(SphinxDirective):
