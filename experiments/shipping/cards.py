@@ -58,8 +58,8 @@ Nothing steers it, and it draws no lots: one start has one future. It has seen a
 people, and nothing keeps a bone's length. How long its dances last stands in
 `results/dances_rollouts.json` and in the book.""",
     "LSTM-3LR": """\
-It is here to be seen failing: one start has one future, which soon stands still, sinks into the floor or
-loses the length of its bones. How long such networks last stands in `results/dances_rollouts.json`.""",
+It is here to be seen failing: one start has one future, whose pose soon freezes while the body glides
+off, or which sinks into the floor, or loses the length of its bones. How long such networks last stands in `results/dances_rollouts.json`.""",
     "Strnn": """\
 Nothing steers it, and it keeps to no kind of motion: a dance may end in a walk. Points have no bones, so that
 lengths waver until `to_motion` makes a body of them, and feet slide. How far it goes on by itself stands in
