@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from contextlib import contextmanager
 from dataclasses import replace
 from io import BytesIO
 
@@ -12,32 +11,15 @@ import pytest
 import torch
 from PIL import Image
 
-from motionlab import Motion, Skeleton
+from motionlab import Motion
 from motionlab.viewer.live.knobs import knobs
 from motionlab.viewer.live.player import bundle_path
 from motionlab.viewer.live.show import show
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
+from player_pages import PAGE, first, frame, opened, picture, waving  # noqa: E402
+
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
-
-PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
-<meta name="viewport" content="width=device-width"><title>players</title>
-<script src="player.js"></script><body style="margin: 8px">{}</body></html>"""
-
-
-def waving() -> Motion:
-    """Ten seconds: the arms swing, the body walks 8 m."""
-    skeleton, frames = Skeleton.canonical(), 300
-    turns = torch.eye(3).repeat(frames, skeleton.joints, 1, 1)
-    angle = torch.sin(torch.arange(frames) / 8)
-    for role in ("left_upper_arm", "right_upper_leg"):
-        spin = turns[:, skeleton.index(role)]
-        spin[:, 1, 1] = spin[:, 2, 2] = angle.cos()
-        spin[:, 1, 2], spin[:, 2, 1] = -angle.sin(), angle.sin()
-    root = torch.zeros(frames, 3)
-    root[:, 1], root[:, 2] = 0.85, torch.linspace(0, 8, frames)
-    contacts = torch.rand(frames, 4, generator=torch.Generator().manual_seed(0)) > 0.5
-    return Motion(skeleton, root, turns, 30.0, "walk", contacts=contacts)
 
 
 @pytest.fixture(scope="module")
@@ -55,36 +37,6 @@ def page_file(tmp_path_factory):
     html = PAGE.format("<p>text</p>".join(figure.html for figure in figures))
     (folder / "page.html").write_text(html, encoding="utf-8")
     return folder / "page.html"
-
-
-@contextmanager
-def opened(browser, file, flags=(), **settings):
-    """The page in a fresh window without network; fails if it logged an error or asked for more."""
-    size = {"width": 700, "height": 700}
-    window = browser.new_context(**{"viewport": size, "offline": True, **settings})
-    visit = check_book.Visit(window, file.as_uri())
-    try:
-        yield visit.page
-        assert visit.troubles == []
-        assert {url.rsplit("/", 1)[1] for url in visit.loaded if "data:" not in url} <= {
-            file.name,
-            "player.js",
-        }
-    finally:
-        window.close()
-
-
-def first(page):
-    return page.locator("figure.motionlab-player").first
-
-
-def frame(figure) -> int:
-    return int(figure.get_attribute("data-frame"))
-
-
-def picture(page, figure) -> bytes:
-    page.wait_for_timeout(500)
-    return figure.locator("canvas").screenshot()
 
 
 def test_it_plays_scrubs_and_listens_to_keys(browser, page_file):
@@ -201,49 +153,6 @@ def test_a_slider_chooses_which_motion_is_seen(browser, page_file):
         assert page.locator(".ml-choose output").inner_text() == "1"
         assert page.locator(".ml-overlay").is_hidden()
         assert page.evaluate("document.querySelector('figure').motionlab.frame") >= 30
-        page.set_viewport_size({"width": 390, "height": 700})
-        assert page.evaluate("document.documentElement.scrollWidth") <= 390
-
-
-def test_a_camera_that_looks_at_the_feet_stands_near_them(browser, page_file):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("MOTIONLAB_VIEWER", "page")
-        figures = [show(waving(), focus=focus, height=240) for focus in ("body", "feet")]
-    file = page_file.with_name("focus.html")
-    file.write_text(PAGE.format("".join(figure.html for figure in figures)), encoding="utf-8")
-    orbits = "[...document.querySelectorAll('figure')].map((f) => f.motionlab.orbit)"
-    stands = f"{orbits}.map((o) => [o.distance, o.controls.target.y])"
-    with opened(browser, file) as page:
-        page.wait_for_selector("canvas")
-        (far, hips), (near, ankles) = page.evaluate(stands)
-        assert 0 < near < 0.6 * far and 0 < ankles < hips / 2
-        page.locator("canvas").nth(1).press("+")
-        assert page.evaluate(stands)[1][0] < near
-        page.locator("canvas").nth(1).press("r")  # back to where it stood at first
-        assert page.evaluate(stands)[1] == pytest.approx([near, ankles], rel=1e-3)
-
-
-def test_a_cursor_in_the_chart_follows_the_player_and_leads_it(browser, page_file):
-    height = [frame if frame < 200 else float("nan") for frame in range(300)]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("MOTIONLAB_VIEWER", "page")
-        figure = show(waving(), chart={"toe": height}, chart_label="height (cm)", height=240)
-    file = page_file.with_name("chart.html")
-    file.write_text(PAGE.format(figure.html), encoding="utf-8")
-    with opened(browser, file, reduced_motion="reduce") as page:
-        page.wait_for_selector(".ml-overtime")
-        player = "document.querySelector('figure').motionlab"
-        cursor, told = page.locator(".ml-overtime-now"), page.locator(".ml-overtime output")
-        page.evaluate(f"{player}.setFrame(150)")
-        assert float(cursor.get_attribute("x1")) == pytest.approx(1000 * 150 / 299)
-        assert told.inner_text() == "150"
-        assert cursor.evaluate("line => getComputedStyle(line).visibility") == "visible"
-        page.evaluate(f"{player}.setFrame(250)")
-        assert told.inner_text() == ""
-        box = page.locator(".ml-overtime-plot").bounding_box()
-        page.mouse.click(box["x"] + box["width"] / 2, box["y"] + 20)
-        assert abs(page.evaluate(f"{player}.frame") - 149) <= 2
-        assert page.get_by_role("img", name="height (cm), over time: toe").count() == 1
         page.set_viewport_size({"width": 390, "height": 700})
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
 

@@ -19,6 +19,8 @@ export class Chart {
     const [low, high] = [Math.min(...known, ...(log ? [] : [0])), Math.max(...known)];
     this.x = (frame) => (WIDE * frame) / this.last;
     this.y = (value) => TALL - (TALL * (scale(value) - scale(low))) / (scale(high) - scale(low) || 1);
+    const unit = log ? 0 : 10 ** (Math.floor(Math.log10(high - low || 1)) - 2); // what is less is no news
+    this.said = (value) => short(value === null || log ? value : Math.round(value / unit) * unit);
     this.element = make("div", "ml-overtime");
     const plot = make("div", "ml-overtime-plot");
     plot.setAttribute("role", "img");
@@ -27,7 +29,7 @@ export class Chart {
     for (const { color, values } of lines) picture.append(drawn("path", { d: this.way(values, log), stroke: color, fill: "none", "stroke-width": 1.5 }));
     this.cursor = drawn("line", { y1: 0, y2: TALL, class: "ml-overtime-now" });
     picture.append(this.cursor);
-    plot.append(picture, ...[["ml-high", high], ["ml-low", low]].map(([side, value]) => make("span", side, short(value))));
+    plot.append(picture, ...[["ml-high", high], ["ml-low", low]].map(([side, value]) => make("span", side, this.said(value))));
     this.element.append(this.legend(label), plot);
     const seek = (event) => {
       if (event.type === "pointermove" && !event.buttons) return;
@@ -65,8 +67,8 @@ export class Chart {
 
   show({ frame }) {
     for (const side of ["x1", "x2"]) this.cursor.setAttribute(side, this.x(frame));
-    this.lines.forEach(({ values }, i) => { this.told[i].textContent = short(values[frame] ?? null); });
+    this.lines.forEach(({ values }, i) => { this.told[i].textContent = this.said(values[frame] ?? null); });
   }
 }
 
-const short = (value) => (value === null ? "" : Number(value.toPrecision(2)).toString());
+const short = (value) => (value === null ? "" : Number(value.toPrecision(3)).toString());

@@ -343,12 +343,6 @@ POINTS = standing(5).positions()
         (((standing(2),), {"choose": "weight"}), "two motions or more"),
         ((([standing(2)] * 3,), {"choose": "weight", "overlay": True}), "not overlaid"),
         ((([standing(2)] * 3,), {"choose": "weight", "chosen": 3}), "chosen is 3"),
-        (((standing(2),), {"focus": "toes"}), "'body' or 'feet'"),
-        (((standing(2),), {"chart": [1.0, 2.0]}), "one value a frame"),
-        (((standing(2),), {"chart": {"toe": [1.0, 2.0, 3.0]}}), r"'toe' has shape \(3,\)"),
-        (((standing(2),), {"chart": {"toe": [[1.0], [2.0]]}}), r"shape \(2, 1\)"),
-        (((standing(2),), {"chart": {"toe": ["a", "b"]}}), "not numbers"),
-        (((standing(2),), {"chart": {"toe": [-1.0, 0.0]}, "chart_log": True}), "above 0"),
     ],
 )
 def test_bad_arguments_say_what_and_what_to_do(arguments, says):
@@ -390,19 +384,6 @@ def test_one_of_several_can_be_chosen():
     player.chosen = 9
     assert player.chosen == 2
     assert "choose" not in show([standing(2)] * 3).payload
-    player.close()
-
-
-def test_lines_below_the_picture_are_sent_with_gaps_where_nothing_is_known():
-    lines = {"RNN": [1.0, np.nan, 1 / 3], "toe": torch.tensor([0.0, 2.0])}
-    player = show(standing(3), chart=lines, chart_label="speed (m/s)", chart_log=True)
-    sent = player.payload["chart"]
-    assert (sent["label"], sent["log"]) == ("speed (m/s)", True)
-    assert sent["lines"][0] == {
-        "name": "RNN", "color": palette.color("RNN"), "values": [1.0, None, 0.3333]
-    }  # fmt: skip
-    assert sent["lines"][1]["values"] == [None, 2.0]
-    assert "chart" not in show(standing(3)).payload
     player.close()
 
 

@@ -17,7 +17,6 @@ from ...errors import ViewerError
 from ...motion import Motion
 from ...skeleton import Skeleton
 from ..pictures.palette import PATH, check_color, color
-from .chart import chart_of
 from .figure import PageFigure
 from .player import Player, Track, page_html, payload
 
@@ -104,7 +103,7 @@ def show(
                 f"chosen one of their numbers; there are {len(tracks)}, chosen is {chosen}."
             )
     longest = max(len(track.positions) for track in tracks)
-    lines = chart_of(chart_label, chart, longest, chart_log)
+    lines = _chart(chart_label, chart, longest, chart_log)
     data = payload(
         tracks,
         rate,
@@ -296,6 +295,33 @@ def _point(skeleton: Skeleton, name: str) -> int:
     if name in skeleton.point_names:
         return skeleton.point_names.index(name)
     return skeleton.index(name)  # a role, or an error that lists what there is
+
+
+def _chart(
+    label: str | None, lines: Mapping[str, Sequence[float]] | None, frames: int, log: bool
+) -> dict[str, Any] | None:
+    """What web/src/chart.js reads: names, colours and values, None where there is none."""
+    if lines is None:
+        return None
+    if not isinstance(lines, Mapping) or not lines:
+        raise ViewerError(
+            "show: chart is {name: values}, one value a frame, such as {'left toe': heights}."
+        )
+    sent = []
+    for index, (name, values) in enumerate(lines.items()):
+        try:
+            row = np.asarray(values, dtype=float)
+        except (TypeError, ValueError, RuntimeError) as error:
+            raise ViewerError(f"show: chart's {name!r} is not numbers: {error}.") from error
+        drawn = np.isfinite(row) & (row > 0 if log else True)
+        if row.ndim != 1 or not 0 < len(row) <= frames or not drawn.any():
+            raise ViewerError(
+                f"show: chart's {name!r} has shape {row.shape}, the motion {frames} frames; give one "
+                f"value a frame, some of them {'above 0' if log else 'finite'}."
+            )
+        said = [float(f"{v:.4g}") if ok else None for v, ok in zip(row, drawn, strict=True)]
+        sent.append({"name": str(name), "color": color(name, index), "values": said})
+    return {"label": label or "", "log": log, "lines": sent}
 
 
 def still_picture(track: Track) -> str:
