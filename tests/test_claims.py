@@ -15,7 +15,7 @@ import steering_cases
 import strnn_cases
 import yaml
 
-from experiments.claims import comparison, rnn_gan, verdicts
+from experiments.claims import aclstm, comparison, rnn_gan, verdicts
 
 ROOT = Path(__file__).parents[1]
 FILE = Path("experiments", "claims", "claims.yaml")
@@ -266,6 +266,23 @@ def test_without_results_all_is_open_and_with_ours_all_is_a_verdict(claim, tmp_p
     found = verdicts.judge(claim, tmp_path)
     assert found.verdict == "open" and found.remark
     assert verdicts.judge(claim).verdict in verdicts.VERDICTS
+
+
+def test_a_network_that_comes_apart_is_not_said_to_freeze():
+    limits = claim_of("Z1-plain")["limits"]
+    found = aclstm_cases.plain((1.0, 2.0, 4.9), (10.0, 60.0, 49.0))
+    assert not aclstm.z1_plain(limits, found).remark
+    for seed in found["rows"]["lstm-3lr-indian"]["seeds"].values():
+        seed["how"] = ["diverged", "diverged", "frozen"]
+    assert "6 of 9 rollouts come apart" in aclstm.z1_plain(limits, found).remark
+
+
+def test_liveliness_says_that_feet_do_not_count():
+    limits, found = claim_of("W1-likeness")["limits"], likeness()
+    assert not rnn_gan.w1_likeness(limits, found).remark
+    found["likeness"]["samples over data"]["foot skate (cm/s)"] = 6.79
+    told = rnn_gan.w1_likeness(limits, found)
+    assert "6.8 times" in told.remark and told.verdict == "reproduced"
 
 
 def test_edge_of_learning_rates_is_said():

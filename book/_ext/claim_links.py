@@ -1,11 +1,19 @@
-"""A claim that is named in the text, W8 or Z1-plain, leads to its row in the ledger, and says what it is."""
+"""A claim that is named in the text, W8 or Z1-plain, leads to its row in the ledger, and says what it is.
+
+    :::{verdicts} 4
+    :::
+
+is a table of all claims of chapter 4 with their verdicts, as the ledger has them today.
+"""
 
 import re
 import sys
 from pathlib import Path
 
 from docutils import nodes
+from docutils.statemachine import StringList
 from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).resolve().parents[2]
 LEDGER = "book/claims"
@@ -22,20 +30,57 @@ addEventListener("DOMContentLoaded", openClaim);
 """
 
 
-def told() -> dict[str, tuple[str, str]]:
-    """Of each name: the row it leads to, and what it says. W1 leads to the first of W1-variety and others."""
+def judged() -> list[tuple[dict, str, str, str]]:
+    """Each claim with its verdict in words, the class of its badge, and what must be said with it."""
     if str(ROOT) not in sys.path:
         sys.path.insert(0, str(ROOT))
     from experiments.claims import verdict, verdicts
 
-    found = {}
+    found = []
     for claim in verdicts.claims():
-        ruling = verdicts.judge(claim).verdict
-        ruling = "not reproduced" if ruling == verdict.NOT else ruling
-        said = claim["id"].lower(), f"{claim['claim']} ({ruling})"
+        its = verdicts.judge(claim)
+        ruling = "not reproduced" if its.verdict == verdict.NOT else its.verdict
+        badge = "untestable" if its.verdict == verdict.UNTESTABLE else its.verdict
+        found.append((claim, ruling, badge, its.remark))
+    return found
+
+
+def told() -> dict[str, tuple[str, str]]:
+    """Of each name: the row it leads to, and what it says. W1 leads to the first of W1-variety and others."""
+    found = {}
+    for claim, ruling, _, remark in judged():
+        more = f": {remark}" if remark else ""
+        said = claim["id"].lower(), f"{claim['claim']} ({ruling}{more})"
         found[claim["id"]] = said
         found.setdefault(claim["id"].partition("-")[0], said)
     return found
+
+
+def table(chapter: int) -> list[str]:
+    """Lines of a table in Markdown: the claims of a chapter and their verdicts."""
+    rows = [
+        f"| {claim['id']} | {claim['claim']} [{ruling}]{{.verdict .{badge}}} {remark} |"
+        for claim, ruling, badge, remark in judged()
+        if claim.get("chapter") == chapter
+    ]
+    if not rows:
+        raise ValueError(f"no claim is told in chapter {chapter}")
+    return ["| | what is claimed, and what became of it here |", "|---|---|", *rows]
+
+
+class Verdicts(SphinxDirective):
+    """The table of a chapter's claims."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        try:
+            lines = table(int(self.arguments[0]))
+        except ValueError as error:
+            raise self.error(f"verdicts: {error}") from error
+        found = nodes.container(classes=["verdicts"])
+        self.state.nested_parse(StringList(lines, source=__file__), 0, found)
+        return [found]
 
 
 def link(document: nodes.document, known: dict[str, tuple[str, str]], ledger: str) -> None:
@@ -71,6 +116,7 @@ def setup(app: Sphinx) -> dict:
             link(doctree, known, app.builder.get_relative_uri(docname, LEDGER))
 
     known = told()
+    app.add_directive("verdicts", Verdicts)
     app.connect("doctree-resolved", process)
     app.add_js_file(None, body=OPEN, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -3,6 +3,7 @@
 * A table of more than twenty rows folds, under a line that says how many they are.
 * Counts such as updates, which pandas writes as 500000.0 where a number is missing beside them, are
   written as 500000; what is missing is a dash, not NaN.
+* A row whose name begins with ▸ is one that matters, and stands out.
 """
 
 import re
@@ -30,6 +31,8 @@ def _table(table: str) -> str:
         _count(cells)
     for cell in soup.find_all("td", string=re.compile(r"^(nan|NaN|NaT|None)$")):
         cell.string = "–"
+    for name in soup.find_all("th", string=re.compile("^▸ ")):
+        name.parent["class"] = [*name.parent.get("class", []), "matters"]
     if len(rows) <= ROWS:
         return str(soup)
     return f'<details class="long"><summary>A table of {len(rows)} rows</summary>{soup}</details>'

@@ -59,7 +59,7 @@ def z1_endless(limits: dict, found: dict) -> Verdict:
 
 def z1_plain(limits: dict, found: dict) -> Verdict:
     _long_enough(found)
-    medians, numbers = [], {}
+    medians, numbers, remark = [], {}, ""
     for method, name in (("lstm-3lr", "LSTM-3LR"), ("aclstm", "acLSTM")):
         seeds = _seeds(found, f"{method}-indian", SEEDS)
         medians.append([its["median seconds until failure"] for its in seeds])
@@ -67,6 +67,11 @@ def z1_plain(limits: dict, found: dict) -> Verdict:
         ways = Counter(way for its in seeds for way in its["how"] if way)
         for way, count in ways.most_common():
             numbers[f"{name}, rollouts that first {WAYS[way]}"] = count
+        if method == "lstm-3lr" and ways["diverged"] > ways["frozen"]:
+            remark = (
+                f"it fails that soon, but does not freeze: {ways['diverged']} of {ways.total()} "
+                "rollouts come apart first"
+            )
     plain, auto = medians
     good = [
         all(seconds < limits["soon"] for seconds in plain),
@@ -76,7 +81,7 @@ def z1_plain(limits: dict, found: dict) -> Verdict:
             for longer, seconds in zip(auto, plain, strict=True)
         ),
     ]
-    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers)
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(good)], numbers, remark)
 
 
 def z3(limits: dict, found: dict) -> Verdict:

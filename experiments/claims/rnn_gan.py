@@ -63,7 +63,9 @@ def w1_likeness(limits: dict, samples: dict) -> Verdict:
         abs(ratios["acceleration (m/s²)"] - 1) <= limits["acceleration"],
         abs(ratios["speed (m/s)"] - 1) <= limits["speed"],
     ]
-    return Verdict((NOT, PARTLY, REPRODUCED)[sum(close)], numbers)
+    skate = ratios.get("foot skate (cm/s)")
+    remark = f"speed and acceleration count; feet slide {skate:.1f} times as fast" if skate else ""
+    return Verdict((NOT, PARTLY, REPRODUCED)[sum(close)], numbers, remark)
 
 
 def w1_novelty(limits: dict, samples: dict) -> Verdict:

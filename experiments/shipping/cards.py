@@ -29,6 +29,11 @@ over the ground{toes}. It is no release of the authors of the paper.""",
 An auto-conditioned recurrent network (AcLstm; Zhou and others, *Auto-Conditioned Recurrent Networks for
 Extended Complex Human Motion Synthesis*, 2018) that goes on with motion of the style in its name,
 {fps:g} frames a second, as points in space. It is no release of the authors of the paper.""",
+    "LSTM-3LR": """\
+The plain rival of an auto-conditioned recurrent network (AcLstm; Fragkiadaki and others, *Recurrent Network
+Models for Human Dynamics*, 2015, by the name of Zhou and others, 2018): trained on recorded frames alone, it goes
+on with motion of the style in its name, {fps:g} frames a second, as points in space, until it soon stops or comes
+apart. It is no release of the authors of either paper.""",
     "Strnn": """\
 A network that reads frames, says them again and foretells the next ones, all at once (Strnn; Wang, Ho, Shum
 and Zhu, *Spatio-temporal Manifold Learning for Human Motions via Long-horizon Modeling*, 2021), of walking,
@@ -43,7 +48,7 @@ motion = model.encoding.to_motion(features[0])""",
 features = model.extrapolate(model.starts[0], 300, **model.sampling)
 motion = model.encoding.to_motion(features)""",
 }
-SNIPPETS["AcLstm"] = SNIPPETS["LstmGmm"]
+SNIPPETS["AcLstm"] = SNIPPETS["LSTM-3LR"] = SNIPPETS["LstmGmm"]
 LIMITS = {
     "LstmGmm": """\
 Nothing steers it: it goes where it likes. It knows level ground, and no other body than the canonical
@@ -52,6 +57,9 @@ one. Feet slide more than in its data; `motionlab evaluate {name}` measures by h
 Nothing steers it, and it draws no lots: one start has one future. It has seen a few minutes of a few
 people, and nothing keeps a bone's length. How long its dances last stands in
 `results/dances_rollouts.json` and in the book.""",
+    "LSTM-3LR": """\
+It is here to be seen failing: one start has one future, whose pose soon freezes while the body glides
+off, or which sinks into the floor, or loses the length of its bones. How long such networks last stands in `results/dances_rollouts.json`.""",
     "Strnn": """\
 Nothing steers it, and it keeps to no kind of motion: a dance may end in a walk. Points have no bones, so that
 lengths waver until `to_motion` makes a body of them, and feet slide. How far it goes on by itself stands in
@@ -120,6 +128,8 @@ def card(
     clips, minutes : of training motion; remark : on its limits.
     """
     kind, name = type(model).__name__, about["name"]
+    if kind == "AcLstm" and about["preset"]["feeding"] == "teacher":
+        kind = "LSTM-3LR"
     toes = ", and contacts of the toes" if "contacts" in model.encoding.slices else ""
     begun = f"weights of sha256 {about['start']}" if about["start"] else "chance"
     dancer = kind not in ("LstmGmm", "Strnn")  # they are not mirrored, and their last weights ship

@@ -26,6 +26,7 @@ from motionlab.training import PRESETS, Prepared
 from motionlab.training.checkpoints import load_weights, save_weights, write_whole
 from motionlab.training.evaluation import likelihood
 from motionlab.training.finish import fit_temperature
+from motionlab.training.prepared import DANCES
 from motionlab.training.starts import before_starts
 from motionlab.training.strnn import in_body_frame
 
@@ -59,8 +60,8 @@ def main(arguments: list[str] | None = None) -> None:
 
 def usual_data(name: str) -> str:
     """What weights of a name are trained on."""
-    if name.startswith("aclstm"):
-        return name.rpartition("-")[2]
+    if (style := name.rpartition("-")[2]) in DANCES:
+        return style
     return "everything" if name.startswith("strnn") else "locomotion"
 
 

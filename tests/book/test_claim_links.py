@@ -34,4 +34,16 @@ def test_every_claim_is_known_with_its_verdict(claim_links):
     known = claim_links.told()
     assert set(known) >= {claim["id"] for claim in verdicts.claims()} | {"W1", "S10"}
     assert known["W1"] == known["W1-variety"]
-    assert known["W9"][0] == "w9" and known["W9"][1].endswith("(not testable here)")
+    assert known["W9"][0] == "w9" and "(not testable here: " in known["W9"][1]
+
+
+def test_a_chapter_has_a_table_of_its_claims(claim_links):
+    from experiments.claims import verdicts
+
+    rows = claim_links.table(4)[2:]
+    assert [row.split(" | ")[0] for row in rows] == [
+        f"| {claim['id']}" for claim in verdicts.claims() if claim.get("chapter") == 4
+    ]
+    assert all(row.count("|") == 3 and ".verdict ." in row for row in rows)
+    with pytest.raises(ValueError, match="chapter 1"):
+        claim_links.table(1)

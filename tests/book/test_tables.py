@@ -28,6 +28,13 @@ def test_counts_are_whole_and_what_was_measured_stays(rewrite):
     assert "<td>1374.0</td>" in rewrite(speeds)
 
 
+def test_rows_that_matter_stand_out(rewrite):
+    table = pd.DataFrame({"cm": [1.5, 2.5]}, index=["plain", "▸ ours"])
+    both = pd.concat({"walk": table, "run": table})
+    assert rewrite(table.to_html()).count('class="matters"') == 1
+    assert rewrite(both.to_html()).count('class="matters"') == 2
+
+
 def test_other_tables_stay(rewrite):
     other = "<table><tbody>" + "<tr><td>3000.0</td></tr>" * 20 + "</tbody></table>"
     assert rewrite(other) == other

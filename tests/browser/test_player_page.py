@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from contextlib import contextmanager
 from dataclasses import replace
 from io import BytesIO
 
@@ -12,32 +11,15 @@ import pytest
 import torch
 from PIL import Image
 
-from motionlab import Motion, Skeleton
+from motionlab import Motion
 from motionlab.viewer.live.knobs import knobs
 from motionlab.viewer.live.player import bundle_path
 from motionlab.viewer.live.show import show
 
 check_book = pytest.importorskip("check_book", exc_type=ImportError)
+from player_pages import PAGE, first, frame, opened, picture, waving  # noqa: E402
+
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
-
-PAGE = """<!doctype html><html lang="en"><link rel="icon" href="data:,">
-<meta name="viewport" content="width=device-width"><title>players</title>
-<script src="player.js"></script><body style="margin: 8px">{}</body></html>"""
-
-
-def waving() -> Motion:
-    """Ten seconds: the arms swing, the body walks 8 m."""
-    skeleton, frames = Skeleton.canonical(), 300
-    turns = torch.eye(3).repeat(frames, skeleton.joints, 1, 1)
-    angle = torch.sin(torch.arange(frames) / 8)
-    for role in ("left_upper_arm", "right_upper_leg"):
-        spin = turns[:, skeleton.index(role)]
-        spin[:, 1, 1] = spin[:, 2, 2] = angle.cos()
-        spin[:, 1, 2], spin[:, 2, 1] = -angle.sin(), angle.sin()
-    root = torch.zeros(frames, 3)
-    root[:, 1], root[:, 2] = 0.85, torch.linspace(0, 8, frames)
-    contacts = torch.rand(frames, 4, generator=torch.Generator().manual_seed(0)) > 0.5
-    return Motion(skeleton, root, turns, 30.0, "walk", contacts=contacts)
 
 
 @pytest.fixture(scope="module")
@@ -55,36 +37,6 @@ def page_file(tmp_path_factory):
     html = PAGE.format("<p>text</p>".join(figure.html for figure in figures))
     (folder / "page.html").write_text(html, encoding="utf-8")
     return folder / "page.html"
-
-
-@contextmanager
-def opened(browser, file, flags=(), **settings):
-    """The page in a fresh window without network; fails if it logged an error or asked for more."""
-    size = {"width": 700, "height": 700}
-    window = browser.new_context(**{"viewport": size, "offline": True, **settings})
-    visit = check_book.Visit(window, file.as_uri())
-    try:
-        yield visit.page
-        assert visit.troubles == []
-        assert {url.rsplit("/", 1)[1] for url in visit.loaded if "data:" not in url} <= {
-            file.name,
-            "player.js",
-        }
-    finally:
-        window.close()
-
-
-def first(page):
-    return page.locator("figure.motionlab-player").first
-
-
-def frame(figure) -> int:
-    return int(figure.get_attribute("data-frame"))
-
-
-def picture(page, figure) -> bytes:
-    page.wait_for_timeout(500)
-    return figure.locator("canvas").screenshot()
 
 
 def test_it_plays_scrubs_and_listens_to_keys(browser, page_file):

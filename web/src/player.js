@@ -1,6 +1,7 @@
 // The motion player: puts figures, marks, camera, clock and controls together in one element.
 import { Bar } from "./bar.js";
 import { Orbit } from "./camera.js";
+import { Chart } from "./chart.js";
 import { Clock } from "./clock.js";
 import { Mannequin } from "./mannequin.js";
 import { LINES } from "./ground.js";
@@ -64,7 +65,8 @@ export class Player {
     this.view.append(this.canvas, this.labels);
     if (this.magnified !== 1) this.view.append(this.sayScale());
     this.bar = new Bar(this, frames, fps, this.several);
-    this.host.append(this.view, ...(this.bare ? [] : [this.bar.element]));
+    this.chart = this.payload.chart && new Chart(this, this.payload.chart, frames);
+    this.host.append(this.view, ...(this.chart ? [this.chart.element] : []), ...(this.bare ? [] : [this.bar.element]));
     this.orbit = new Orbit(this.canvas, !REDUCED?.matches);
     this.orbit.controls.addEventListener("change", () => { this.dirty = true; });
     this.view.addEventListener("keydown", (event) => this.key(event));
@@ -209,6 +211,7 @@ export class Player {
   refresh() {
     this.dirty = true;
     this.bar.show(this);
+    this.chart?.show(this);
     if (this.frame !== this.told) this.sayFrame();
   }
 
@@ -265,7 +268,9 @@ export class Player {
     const azimuth = keepAngle ? Math.atan2(arm.x, arm.z) : this.azimuth;
     const cells = this.payload.choose ? this.tracks.map((_, i) => [i]) : this.cells;
     const room = Math.max(...cells.map((cell) => this.room(cell)));
-    this.orbit.place(azimuth, 2.45 * this.tall + 1.7 * room, this.payload.floor + 0.5 * this.tall);
+    // As a share of the body's height: where it looks, and of the way to it, how near it goes.
+    const [middle, near] = this.payload.focus === "feet" ? [0.15, 0.5] : [0.5, 1];
+    this.orbit.place(azimuth, near * (2.45 * this.tall + 1.7 * room), this.payload.floor + middle * this.tall);
     this.dirty = true;
   }
 

@@ -295,6 +295,15 @@ def test_what_suits_the_weights_is_where_the_sliders_stand(model):
     assert (values["temperature"], values["characters"]) == (0.7, 3)
 
 
+def test_a_page_begins_with_the_start_that_is_asked_for(model):
+    first, third = (page_figure(model, seconds=0.1, start=start) for start in (0, 2))
+    values = [{c["name"]: c["value"] for c in f.content["controls"]} for f in (first, third)]
+    assert [its["start"] for its in values] == [0, 2]
+    assert first.content["clips"] == third.content["clips"] and first.still != third.still
+    with pytest.raises(MotionLabError, match="from 0 to 3"):
+        page_figure(model, start=4)
+
+
 def test_a_page_gets_the_network_and_a_kernel_its_widgets(model, monkeypatch):
     assert dream(model, seconds=1).children[0].payload["frames"] == 31
     monkeypatch.setenv("MOTIONLAB_VIEWER", "page")

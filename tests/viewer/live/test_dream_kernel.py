@@ -106,6 +106,16 @@ def test_a_dancer_has_the_fields_that_it_has_a_use_for():
     assert "one future" not in box.children[2].value
 
 
+def test_it_begins_with_the_start_that_is_asked_for(box, model):
+    begun = dream(model, seconds=1, start=1)
+    assert fields(begun)["Start"].value == 1
+    assert player(begun).payload["tracks"] != player(box).payload["tracks"]
+    fields(box)["Start"].value = 1
+    assert player(begun).payload["tracks"] == player(box).payload["tracks"]
+    with pytest.raises(ViewerError, match="start is -1"):
+        dream(model, start=-1)
+
+
 def test_seconds_are_seconds(box):
     fields(box)["Seconds"].value = 4
     assert player(box).payload["frames"] == 4 * 30 + 1

@@ -18,6 +18,7 @@ def dream(
     *,
     seconds: float = 10.0,
     characters: int = 1,
+    start: int = 0,
     trail: str | int | Sequence[str | int] | None = None,
     color: str = "RNN",
     caption: str | None = None,
@@ -34,6 +35,7 @@ def dream(
     model : as `motionlab.load` gives it.
     seconds : how long the motion is at first, in a kernel; a page goes on without end.
     characters : how many futures of a start there are at first.
+    start : number of the start that is seen first, among the model's `starts`.
     trail : joints (names, roles or point indices) that leave a trail; by default hips and toes.
     color : a method's name or a colour.
     caption : a text below the figure.
@@ -43,10 +45,11 @@ def dream(
 
     Raises
     ------
-    ViewerError : another kind of model, one without starts, or a refiner of other features.
+    ViewerError : another kind of model, one without starts or without that one, or a refiner of
+        other features.
     """
     look = {"trail": trail, "color": palette.check_color(color), "height": height}
     look["refiner"] = refiner
     if os.environ.get("MOTIONLAB_VIEWER") == "page":
-        return page_figure(model, characters, caption, **look)
-    return controls(model, seconds, characters, caption, **look)
+        return page_figure(model, characters, caption, start=start, **look)
+    return controls(model, seconds, characters, start, caption, **look)

@@ -24,14 +24,15 @@ LAYOUT = ipywidgets.Layout(width="440px")
 
 
 def controls(
-    model: nn.Module, seconds: float, characters: int, caption: str | None, **look: Any
+    model: nn.Module, seconds: float, characters: int, start: int, caption: str | None, **look: Any
 ) -> ipywidgets.VBox:
     """A player with sliders for all that `generate` lets one choose; each change samples anew.
 
     Parameters as of `dream`. Sliders begin at the model's ``sampling``, if it has one.
     """
-    check_starts(model)
-    given = {"seconds": seconds, "characters": characters, **getattr(model, "sampling", {})}
+    check_starts(model, start)
+    given = {"seconds": seconds, "characters": characters, "start": start}
+    given |= getattr(model, "sampling", {})
     fields = {
         c.name: _field(c, given.get(c.name, c.value), model.start_names)
         for c in (*controls_of(model, look.get("refiner")), SECONDS)

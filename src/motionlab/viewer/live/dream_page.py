@@ -25,6 +25,7 @@ def page_figure(
     characters: int = 1,
     caption: str | None = None,
     *,
+    start: int = 0,
     seconds: float = 2.0,
     trail: str | int | Sequence[str | int] | None = None,
     color: str = "RNN",
@@ -38,7 +39,7 @@ def page_figure(
     rotation vectors or on `RootRelative` with absolute heights.
     """
     check_known(model)
-    check_starts(model)
+    check_starts(model, start)
     color = palette.check_color(color)
     weights = weights_script(model, name_of(model), refiner=refiner)
     sampling = getattr(model, "sampling", {})
@@ -49,7 +50,7 @@ def page_figure(
     common = {"height": height, "autoplay": True, "trail": trail_of(trail, tracks)}
     clips = [payload([track], model.fps, follow=True, overlay=False, **common) for track in tracks]
     live = {**common, **live_of(model, weights, tracks, color)}
-    values = {"characters": characters, **sampling}
+    values = {"characters": characters, "start": start, **sampling}
     content = {
         "clips": clips,
         "live": live,
@@ -59,4 +60,4 @@ def page_figure(
         ],
         "facts": provenance(model, weights, refiner),
     }
-    return NetworkFigure(content, weights, still_picture(tracks[0]), caption)
+    return NetworkFigure(content, weights, still_picture(tracks[start]), caption)

@@ -55,12 +55,17 @@ def controls_of(model: nn.Module, refiner: nn.Module | None = None) -> list[Cont
     return its if refiner is None else [*its, REFINED]
 
 
-def check_starts(model: nn.Module) -> None:
-    """Raise ViewerError if a model has no states to start from."""
-    if not getattr(model, "start_names", ()):
+def check_starts(model: nn.Module, start: int = 0) -> None:
+    """Raise ViewerError if a model has no states to start from, or none of this number."""
+    names = getattr(model, "start_names", ())
+    if not names:
         raise ViewerError(
             "This model has no states to start from; motionlab.load gives it some, or set "
             "model.starts = model.observe(features) and model.start_names = ('name', ...)."
+        )
+    if start not in range(len(names)):
+        raise ViewerError(
+            f"start is {start!r}; this model has {len(names)}: give a number from 0 to {len(names) - 1}."
         )
 
 

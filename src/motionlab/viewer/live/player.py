@@ -89,7 +89,8 @@ def payload(
     paths : ``{"points": [[x, z], ...], "color": "#...", "track": index or None}``, metres.
     trail : points that leave a trail.
     options : height, follow, overlay, autoplay, speed; choose, the name of a slider over the tracks,
-        of which one is seen at a time, and chosen, which is at first.
+        of which one is seen at a time, and chosen, which is at first; focus, what the camera looks at;
+        chart, lines below the picture.
 
     Places, lengths and radii are ``magnified`` times what they are, but for the skeletons, which
     are saved. Every ``stride``-th frame is stored, so that at least `SHOWN_FPS` a second are; ``frames`` and

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,10 @@ def show(
     overlay: bool = False,
     choose: str | None = None,
     chosen: int = 0,
+    focus: str = "body",
+    chart: Mapping[str, Sequence[float]] | None = None,
+    chart_label: str | None = None,
+    chart_log: bool = False,
     caption: str | None = None,
     height: int = 380,
     skeleton: Skeleton | None = None,
@@ -62,6 +66,10 @@ def show(
     choose : name of a slider by which one motion is seen at a time, such as "weight"; its values are
         the labels.
     chosen : number of the motion that is seen at first, then.
+    focus : "body", or "feet": at first the camera stands near the ground and sees the legs alone.
+    chart : named lines of one value a frame, below the picture, with a cursor that follows the player
+        and can be dragged; NaN leaves a gap.
+    chart_label, chart_log : what the lines are and their unit; a logarithmic axis.
     caption : a text below the player.
     height : of the picture, pixels.
     skeleton, fps : of point positions; needed for those only.
@@ -86,12 +94,16 @@ def show(
     rate = _rate(motions, fps)
     if not isinstance(height, int | np.integer) or not 120 <= height <= 2000:
         raise ViewerError(f"show: height is {height!r}; give pixels, from 120 to 2000.")
+    if focus not in ("body", "feet"):
+        raise ViewerError(f"show: focus is {focus!r}; give 'body' or 'feet'.")
     if choose is not None:
         if overlay or len(tracks) < 2 or not 0 <= chosen < len(tracks):
             raise ViewerError(
                 f"show: choose={choose!r} is a slider over two motions or more, not overlaid, and "
                 f"chosen one of their numbers; there are {len(tracks)}, chosen is {chosen}."
             )
+    longest = max(len(track.positions) for track in tracks)
+    lines = _chart(chart_label, chart, longest, chart_log)
     data = payload(
         tracks,
         rate,
@@ -101,6 +113,8 @@ def show(
         overlay=bool(overlay),
         follow=True,
         autoplay=bool(autoplay),
+        **({} if focus == "body" else {"focus": focus}),
+        **({} if lines is None else {"chart": lines}),
         **({} if choose is None else {"choose": str(choose), "chosen": int(chosen)}),
     )
     if os.environ.get("MOTIONLAB_VIEWER") == "page" if page is None else page:
@@ -281,6 +295,33 @@ def _point(skeleton: Skeleton, name: str) -> int:
     if name in skeleton.point_names:
         return skeleton.point_names.index(name)
     return skeleton.index(name)  # a role, or an error that lists what there is
+
+
+def _chart(
+    label: str | None, lines: Mapping[str, Sequence[float]] | None, frames: int, log: bool
+) -> dict[str, Any] | None:
+    """What web/src/chart.js reads: names, colours and values, None where there is none."""
+    if lines is None:
+        return None
+    if not isinstance(lines, Mapping) or not lines:
+        raise ViewerError(
+            "show: chart is {name: values}, one value a frame, such as {'left toe': heights}."
+        )
+    sent = []
+    for index, (name, values) in enumerate(lines.items()):
+        try:
+            row = np.asarray(values, dtype=float)
+        except (TypeError, ValueError, RuntimeError) as error:
+            raise ViewerError(f"show: chart's {name!r} is not numbers: {error}.") from error
+        drawn = np.isfinite(row) & (row > 0 if log else True)
+        if row.ndim != 1 or not 0 < len(row) <= frames or not drawn.any():
+            raise ViewerError(
+                f"show: chart's {name!r} has shape {row.shape}, the motion {frames} frames; give one "
+                f"value a frame, some of them {'above 0' if log else 'finite'}."
+            )
+        said = [float(f"{v:.4g}") if ok else None for v, ok in zip(row, drawn, strict=True)]
+        sent.append({"name": str(name), "color": color(name, index), "values": said})
+    return {"label": label or "", "log": log, "lines": sent}
 
 
 def still_picture(track: Track) -> str:
