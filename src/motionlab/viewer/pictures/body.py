@@ -172,8 +172,9 @@ class _Tailor:
     def _hands(self) -> None:
         # Some sources end at the wrist: lengthen the forearm by a hand.
         for side in SIDES:
-            hand, elbow = self.roles.get(f"{side}_hand"), self.roles.get(f"{side}_lower_arm")
-            if hand is None or elbow is None:
+            hand = self.roles.get(f"{side}_hand")
+            elbow = self._role_above(f"{side}_lower_arm", hand)
+            if elbow is None:
                 continue
             reach = max((self._reach(child) for child in self.children[hand]), default=0.0)
             if reach < 0.04 * self.size:
@@ -182,17 +183,20 @@ class _Tailor:
     def _feet(self) -> tuple[int, ...]:
         marks = []
         for side in SIDES:
-            foot, knee = self.roles.get(f"{side}_foot"), self.roles.get(f"{side}_lower_leg")
-            if foot is None or knee is None:
+            foot = self.roles.get(f"{side}_foot")
+            knee = self._role_above(f"{side}_lower_leg", foot)
+            if knee is None:
                 return ()
+            toes = self.roles.get(f"{side}_toes")
+            named = toes is not None and foot in self._ancestors(toes)
             # Where the toes are a joint of their own, the ankle is marked higher up.
-            heel = self._beyond(knee, foot, HEEL if f"{side}_toes" in self.roles else 0.030)
+            heel = self._beyond(knee, foot, HEEL if named else 0.030)
             self._add(foot, heel, (0.036, 0.034))
-            toes = self.roles.get(f"{side}_toes", next(iter(self.children[foot]), foot))
+            toes = toes if named else next(iter(self.children[foot]), foot)
             if toes != foot:
                 self._add(heel, toes, (0.036, 0.034))
             tips = [tip for tip in self.children[toes] if self.lengths[tip] > SHORTEST]
-            if f"{side}_toes" in self.roles and not tips:
+            if named and not tips:
                 self._add(toes, self._toe_tip(heel, foot, toes), LIMBS["toes"])
             marks += [heel, toes]
         return tuple(marks)
@@ -211,7 +215,8 @@ class _Tailor:
             return None
         # without a neck, the skull goes on from whatever carries the head
         below = [p for p in self._ancestors(head)[1:] if self._distance(p, head) > SHORTEST]
-        neck = self.roles.get("neck", next(iter(below), None))
+        neck = self._role_above("neck", head)
+        neck = next(iter(below), None) if neck is None else neck
         if neck is None:
             return None
         tops = [
@@ -279,6 +284,11 @@ class _Tailor:
 
     def _nearest_role(self, point: int) -> str | None:
         return next((self.role_of[p] for p in self._ancestors(point) if p in self.role_of), None)
+
+    def _role_above(self, role: str, point: int | None) -> int | None:
+        """The point of a role if it carries another: from a point that does not, no line leads on."""
+        above = self.roles.get(role)
+        return above if point is not None and above in self._ancestors(point) else None
 
     def _role_below(self, point: int) -> str | None:
         while point not in self.role_of and len(self.children[point]) == 1:
