@@ -226,7 +226,8 @@ def smooth_lines(numbers: Tensor, seen: Tensor, stiffness: Tensor | float) -> Te
 
     Parameters
     ----------
-    numbers : (frames, channels) float64; seen : bool like them, what counts.
+    numbers : (frames, channels) float64.
+    seen : bool like them, what counts.
     stiffness : of all, or (channels,).
 
     Returns

@@ -97,7 +97,8 @@ def lock(
 
     Parameters
     ----------
-    root_positions : (..., frames, 3) metres; rotations : (..., frames, joints, 3, 3), local.
+    root_positions : (..., frames, 3) metres.
+    rotations : (..., frames, joints, 3, 3), local.
     contacts : bool (..., frames, 2) or (..., frames, 4).
 
     Returns

@@ -35,7 +35,8 @@ def tree_step(
     places, gaps : (n, points, 3) metres, where points are, and from there to their targets.
     weights : (n, points).
     torques : (n, joints, 3) square metres, what draws the joints besides their points.
-    turning : (n,) square metres, above 0; shifting : (n,), from 0.
+    turning : (n,) square metres, above 0.
+    shifting : (n,), from 0.
 
     Returns
     -------

@@ -23,7 +23,8 @@ class BidirectionalRnn(Strnn):
 
     Parameters
     ----------
-    encoding : `BodyFrame`. normalizer : fitted on the training split.
+    encoding : `BodyFrame`.
+    normalizer : fitted on the training split.
     width : of decoder and predictor; each direction of the encoder has half of it. A multiple of 8.
     encode, predict, smooth, penalty : as of `Strnn`.
 

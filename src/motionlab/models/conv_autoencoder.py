@@ -31,8 +31,10 @@ class ConvAutoencoder(nn.Module):
 
     Parameters
     ----------
-    encoding : such as `BodyFrame`. normalizer : fitted on the training split.
-    widths : patterns of each layer. span : frames of a pattern, an odd number.
+    encoding : such as `BodyFrame`.
+    normalizer : fitted on the training split.
+    widths : patterns of each layer.
+    span : frames of a pattern, an odd number.
     missing : share of the numbers of a frame that are zero in training.
     sparse : what the mean size of the innermost numbers costs in training.
 

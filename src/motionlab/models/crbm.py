@@ -32,7 +32,8 @@ class Crbm(nn.Module):
 
     Parameters
     ----------
-    encoding : what a row of features means. normalizer : fitted on the training split.
+    encoding : what a row of features means.
+    normalizer : fitted on the training split.
     width : hidden units; 150 in the paper's walks.
     order : frames before that one looks at.
     steps : Gibbs steps of contrastive divergence, from the true frame.

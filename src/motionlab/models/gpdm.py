@@ -34,7 +34,8 @@ class Gpdm(nn.Module):
 
     Parameters
     ----------
-    encoding : what a row of features means. normalizer : fitted on the training split.
+    encoding : what a row of features means.
+    normalizer : fitted on the training split.
     latent : dimensions of a point; 3 in the paper.
     encode : last frames of which points are found, to go on from.
     rounds : steps of gradient descent by which they are found.

@@ -51,7 +51,8 @@ class Strnn(nn.Module):
 
     Parameters
     ----------
-    encoding : `BodyFrame`. normalizer : fitted on the training split.
+    encoding : `BodyFrame`.
+    normalizer : fitted on the training split.
     width : of the LSTM layers and of a frame's code, 512 in the paper; a multiple of 8.
     encode, predict : frames that are read, and said again, and frames that are foretold.
     spatial : encode and decode frames part by part (`strnn_parts`); "dense": by layers of the same

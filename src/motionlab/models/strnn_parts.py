@@ -72,7 +72,8 @@ class Grouped(nn.Module):
 
     Parameters
     ----------
-    inputs, outputs : size of each group, in order. sees : for each group of outputs, which it sees.
+    inputs, outputs : size of each group, in order.
+    sees : for each group of outputs, which it sees.
     """
 
     def __init__(

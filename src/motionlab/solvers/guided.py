@@ -153,9 +153,11 @@ def guided(
     Parameters
     ----------
     model : on `JointAngles`, whose first channels are step to the left, step ahead, turn.
-    before : (batch), where it goes on; steering : the same characters, moved along.
+    before : (batch), where it goes on.
+    steering : the same characters, moved along.
     arcs : (batch, frames), metres of path that should lie behind them, frame by frame.
-    chance : how frames are drawn; push : without it they are drawn freely.
+    chance : how frames are drawn.
+    push : without it they are drawn freely.
 
     Returns
     -------

@@ -60,10 +60,12 @@ class LiveControl:
     way : "futures", "push" or "gradient", see `live_ways`.
     futures : K, from 1 to 64, samples of which the best is kept; with "gradient" those that the first
         guess is chosen from.
-    window : frames that are decided at a time; steps : of a gradient in each.
+    window : frames that are decided at a time.
+    steps : of a gradient in each.
     budget : evaluations in a window at most, of futures and gradients together.
     seconds : time for a window; the best that there is then is given. The first few futures always are.
-    refiner : corrects the frames behind that; lock : holds feet still, a few frames later.
+    refiner : corrects the frames behind that.
+    lock : holds feet still, a few frames later.
     places : (characters, 3), x, z in metres and yaw in radians where they begin; None: at 0.
     temperature : of the samples; None: 0.6 of the model's own.
     weights : of the terms of a gradient, by name: "prior", "noise", "speed", "direction", "contact",

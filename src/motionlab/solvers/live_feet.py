@@ -23,7 +23,8 @@ class Behind:
 
     Parameters
     ----------
-    encoding : of the features; fps : of them.
+    encoding : of the features.
+    fps : of them.
     frame : (batch, dim), raw units, the frame before the first, which stands at place (batch, 3).
     refiner : corrects them, or None. Its root stays within its reach of the one it is given. While
         `refines` is False it only listens.

@@ -79,7 +79,8 @@ def control(
         rate.
     frames : how many are made.
     fit : "weights", the paper's, a character at a time; or "state".
-    steps : of Adam, for each window. rate : its learning rate; None: `RATES`.
+    steps : of Adam, for each window.
+    rate : its learning rate; None: `RATES`.
     start : (batch, 3), x, z and yaw of the last frame of features; None: the origin.
 
     Raises

@@ -102,12 +102,15 @@ def follow(
     paths : (n), and before : (n), the frame that each begins with, where the path begins.
     tables : of each path, metres (frames + 1,) behind the root, as `Path.timetable` gives them.
     fastest : m/s that who is late does not go beyond.
-    wish : what is wished in a window; weights : of its terms, by name: a number, or one for each path
+    wish : what is wished in a window.
+    weights : of its terms, by name: a number, or one for each path
         (n,).
     method, steps : of `window.solve`.
-    candidates : samples that the first guess is chosen from; guide : whether they are `guided` to the
+    candidates : samples that the first guess is chosen from.
+    guide : whether they are `guided` to the
         path, or free. Guided ones are nearer to it, and less of a walk: what the push bends stays bent,
-        and the end is no better. retries : times that a window which came to nothing begins again, from
+        and the end is no better.
+    retries : times that a window which came to nothing begins again, from
         guided samples: free ones keep their own pace, and do not wait where one is to wait.
     window, overlap : frames; with a window of 1 and no overlap nobody looks ahead.
     chance : how samples are drawn; None: as the model's `sampling` says, from seed 0.

@@ -91,7 +91,9 @@ def run_up(
     Parameters
     ----------
     model : on `JointAngles`.
-    begun : states (n) of the characters; paths : (n); paces : (n), m/s.
+    begun : states (n) of the characters.
+    paths : (n).
+    paces : (n), m/s.
     """
     straight, frames = Curves([Path.through([[0, 0], [0, 100]])]), round(SECONDS * model.fps)
     many = torch.arange(len(paths)).repeat_interleave(SAMPLES)
