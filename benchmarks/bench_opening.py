@@ -29,7 +29,7 @@ const watch = () => {
     player.canvas.dispatchEvent(new KeyboardEvent("keydown", {code: "ArrowUp", key: "ArrowUp", bubbles: true}));
     if (steer.motionlab.commands.used) when.steered = performance.now() / 1000;
   }
-  if (!when.steered) requestAnimationFrame(watch);
+  if (!when.steered || !when.moves) requestAnimationFrame(watch);
 };
 requestAnimationFrame(watch);"""
 
@@ -52,7 +52,7 @@ def main(options: Options) -> None:
             window.add_init_script(WATCH)
             page = window.new_page()
             page.goto((options.book / FRONT).resolve().as_uri())
-            page.wait_for_function("globalThis.when.steered", timeout=120_000)
+            page.wait_for_function("globalThis.when.steered && globalThis.when.moves", timeout=120_000)
             for name, its in times.items():
                 its.append(page.evaluate(f"globalThis.when.{name}"))
             window.close()

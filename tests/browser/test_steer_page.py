@@ -54,10 +54,12 @@ def test_one_that_loads_by_itself_leaves_the_keys_to_the_page(visit):
     """In sight it is loaded; arrow keys scroll until the picture is clicked, then they steer."""
     page = visit("at_once.html").page
     page.wait_for_selector("figure[data-live]", timeout=PATIENCE)
-    page.locator("p[role=status]").filter(has_text="Click the picture, and").wait_for(timeout=PATIENCE)  # fmt: skip
+    page.locator("p[role=status]").filter(has_text="Click the picture, then").wait_for(timeout=PATIENCE)  # fmt: skip
     assert page.evaluate("document.activeElement === document.body")
     page.keyboard.press("ArrowUp")
+    frames_pass(page, 2)
     assert value(page, "commands.used") is False
+    assert value(page, "commands.asked(0).speed") > 1  # he walks by himself
     page.locator("figure canvas").click(position={"x": 60, "y": 60})
     page.keyboard.down("ArrowUp")
     until(page, "figure.commands.used")

@@ -38,7 +38,7 @@ export class Commands {
     const [left, ahead] = this.hand;
     const far = Math.min(Math.hypot(left, ahead), 1);
     if (far) this.path = null;
-    this.used ||= Boolean(far || this.path || settings.onward);
+    this.used ||= Boolean(far || this.path);
     if (this.path) return { speed: settings.speed, path: this.path };
     if (!far) return { speed: settings.onward ? settings.speed : 0, direction: radians(settings.direction) };
     const direction = view + Math.atan2(left, ahead);

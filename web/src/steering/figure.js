@@ -16,7 +16,7 @@ const OF_HANDS = ["speed", "direction", "onward"]; // settings of what is asked;
 const NEAR = [...OF_HANDS, "help", "lock", "refined"]; // those that stand right below the picture, where a thumb is
 const ROOMY = "(min-width: 481px)"; // a window in which all of them do
 
-const CLICK = "Click the picture, and: ";
+const CLICK = "Click the picture, then hold an arrow key: he walks that way. Or drag the stick.";
 const BEGIN = "Hold an arrow key, or W, A, S or D, to walk that way, with Shift to run. Or drag the stick in the picture.";
 
 const make = (tag, className, text = "") => Object.assign(document.createElement(tag), { className, textContent: text });
@@ -153,6 +153,7 @@ export class SteerFigure {
 
   change(name, value) {
     this.settings[name] = value;
+    if (name === "onward") this.commands.used = true;
     if (!this.steered || OF_HANDS.includes(name)) return;
     this.steered.settings[name] = value;
     if (this.content.restarts.includes(name)) this.player.reset();
@@ -192,7 +193,7 @@ export class SteerFigure {
     const [first] = this.steered.records;
     const notes = first?.notes.length ? ` Not met: ${first.notes.join("; ")}.` : "";
     const begun = this.commands.used || notes || this.source.failed;
-    const begin = this.figure.contains(document.activeElement) ? BEGIN : `${CLICK}${BEGIN}`;
+    const begin = this.figure.contains(document.activeElement) ? BEGIN : CLICK;
     this.say(begun ? `${this.source.cost(this.steered, pace)}${notes}` : begin);
   }
 

@@ -53,8 +53,8 @@ def steer(
     color : a method's name or a colour.
     caption : a text below the figure.
     height : of the picture, pixels.
-    at_once : load a page's network as soon as it is in sight; else when its reader asks for it. Who saves
-        data or wants little motion is asked in any case.
+    at_once : load a page's network as soon as it is in sight, and let him walk on until somebody steers;
+        else when its reader asks for it. Who saves data or wants little motion is asked in any case.
 
     Raises
     ------

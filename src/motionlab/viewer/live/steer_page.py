@@ -15,7 +15,7 @@ from .network_figure import NetworkFigure, live_of, provenance
 from .network_weights import WeightsScript, check_known, weights_script
 from .player import Track, payload
 from .show import still_picture
-from .steer_settings import Look, body_of, cast_of, check_model, choice_of, controls_of
+from .steer_settings import ONWARD, Look, body_of, cast_of, check_model, choice_of, controls_of
 
 ROOM = 760  # pixels for settings and what is told
 CLIP = 2.0  # seconds of a clip that is seen until the network is loaded
@@ -45,8 +45,16 @@ def page_figure(
         "at_once": at_once,
         "restarts": ["start", "seed"],  # settings that can't change in the middle of a motion
     }
+    if at_once:
+        _walking(content["networks"])
     still = still_picture(tracks[0])
     return NetworkFigure(content, scripts[0], still, caption, "steer", ROOM, scripts[1:])
+
+
+def _walking(networks: Sequence[dict]) -> None:
+    """Nobody asked for them: so they walk until somebody steers."""
+    for network in networks:
+        next(each for each in network["controls"] if each["name"] == ONWARD.name)["value"] = 1
 
 
 def _network(
