@@ -37,6 +37,13 @@ def add_player(app: Sphinx, pagename, templatename, context, doctree) -> None:
         app.add_js_file("motionlab-player.js", loading_method="defer")
 
 
+def drop_formulas(app: Sphinx, pagename, templatename, context, doctree) -> None:
+    """No MathJax, two megabytes, on a page that has no formula: its cells alone would bring it."""
+    if 'class="math' not in context.get("body", ""):
+        needed = lambda script: "mathjax" not in (getattr(script, "filename", "") or "")
+        context["script_files"] = list(filter(needed, context.get("script_files", [])))
+
+
 def copy_scripts(app: Sphinx, error) -> None:
     """One player and one viewer of scenes for the whole book; weights that chapters left for pages."""
     if error is None and app.builder.format == "html":
@@ -83,6 +90,7 @@ def table_of(rows: list[tuple[str, ...]]) -> nodes.table:
 def setup(app: Sphinx) -> dict:
     app.connect("config-inited", drop_buttons_without_repository)
     app.connect("html-page-context", add_player)
+    app.connect("html-page-context", drop_formulas, priority=900)  # when all have added theirs
     app.add_directive("build-record", BuildRecord)
     app.connect("build-finished", copy_scripts)
     app.add_js_file(None, body=SEARCH_FROM_DISK, priority=800)
