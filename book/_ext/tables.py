@@ -12,9 +12,7 @@ from bs4 import BeautifulSoup
 from sphinx.application import Sphinx
 
 ROWS = 20  # more than these fold
-COUNT = (
-    1000  # a column or row of whole numbers, the largest of them at least this, counts something
-)
+COUNT = 10  # a column or row of whole numbers, the largest of them at least this, counts something
 FRAME = re.compile(r'<table[^>]*class="dataframe.*?</table>', re.DOTALL)
 NUMBER = re.compile(r"-?\d+(\.\d+)?")
 

@@ -32,13 +32,13 @@ export class SteerFigure {
     this.unwatchTheme = watchTheme((theme) => { figure.dataset.mlTheme = theme; });
     figure.dataset.mlTheme = currentTheme();
     this.stage.addEventListener("motionlab:frame", () => this.lines && this.tell());
+    // without being asked, but for who saves data or wants little motion
+    this.waits = content.at_once && !navigator.connection?.saveData && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.choose(0);
-    if (content.at_once) this.loadInSight();
+    if (this.waits) this.loadInSight();
   }
 
-  /** Without being asked, as soon as it is in sight; not for who saves data or wants little motion. */
   loadInSight() {
-    if (navigator.connection?.saveData || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
     const sight = new IntersectionObserver((entries) => {
       if (!entries.some(({ isIntersecting }) => isIntersecting)) return;
       sight.disconnect();
@@ -58,9 +58,20 @@ export class SteerFigure {
     this.panel = this.build(number);
     this.stage.append(this.panel);
     if (this.source.ready) return this.load();
-    this.show((host) => new Player(host, { ...this.network.clip, height }, this.still));
+    if (this.waits) { // a picture alone, since a clip would draw what goes at once
+      const picture = Object.assign(make("img", "ml-waits"), { src: this.still, alt: "" });
+      picture.style.height = `${height}px`;
+      this.stage.replaceChildren(picture, this.panel);
+      return null;
+    }
+    this.showClip();
     this.say("This clip was sampled beforehand. Load the network, and it is yours to steer, here in this page.");
     return null;
+  }
+
+  showClip() {
+    const { height } = this.content;
+    this.show((host) => new Player(host, { ...this.network.clip, height }, this.still));
   }
 
   build(number) {
@@ -73,7 +84,7 @@ export class SteerFigure {
     this.go.addEventListener("click", () => this.load());
     const [grid, others] = [make("div", "ml-grid ml-near"), make("div", "ml-grid")];
     this.more = make("details", "ml-more");
-    this.more.open = globalThis.matchMedia?.(ROOMY).matches ?? true;
+    this.more.open = !this.content.at_once && (globalThis.matchMedia?.(ROOMY).matches ?? true);
     this.more.append(make("summary", "", "More settings"), others);
     if (networks.length > 1) grid.append(this.chooser(number));
     const used = this.network.controls.filter(({ name }) => name !== "futures" || !beside.length);
@@ -121,10 +132,12 @@ export class SteerFigure {
       if (this.network !== network) return; // another was chosen meanwhile
       this.steered = steered;
     } catch (error) {
-      this.go.disabled = false;
+      if (this.waits) this.showClip();
+      this.waits = this.go.disabled = false;
       this.say(error.message);
       return;
     }
+    this.waits = false;
     const payload = { ...network.live, height, kept, trail: [], autoplay: true };
     this.show((host) => new SteerPlayer(host, payload, this.still, this.steered, this.commands));
     this.setLive(true);

@@ -21,10 +21,10 @@ export class StudyFigure {
     watchTheme((theme) => { host.dataset.mlTheme = theme; });
     host.dataset.mlTheme = currentTheme();
     this.store = new Store(this.study.hash, () => this.taken());
-    document.addEventListener("keydown", (event) => this.question?.key(event));
+    document.addEventListener("keydown", (event) => this.asked && this.question?.key(event));
     this.state = this.fits(this.store.read()) ?? this.fresh();
     if (this.state.agreed) this.keep(true); // which tells a window that has it open that this one goes on
-    this.show();
+    this.show({ focus: false }); // a page that has just opened begins at its top
     globalThis.addEventListener("pageshow", ({ persisted }) => persisted && this.resume());
   }
 
@@ -57,7 +57,7 @@ export class StudyFigure {
 
   get at() { return this.state.answers.length; }
 
-  show() {
+  show({ focus = true } = {}) {
     if (this.elsewhere) return;
     this.question?.dispose();
     this.question = null;
@@ -67,7 +67,14 @@ export class StudyFigure {
     else if (!state.practised) this.ask({ clips: PRACTICE[this.study.design], practice: true }, "Practice", 0);
     else if (this.at < this.sequence.length) this.ask(this.task(), `${this.at + 1} of ${this.sequence.length}`, this.at / this.sequence.length);
     else this.finish();
-    this.place.querySelector("h2").focus({ preventScroll: true });
+    if (focus) this.place.querySelector("h2").focus({ preventScroll: true });
+  }
+
+  /** Whether keys are meant for the study: it has the focus, or it is in sight and nothing has. */
+  get asked() {
+    const { activeElement: focused, body, documentElement: { clientHeight } } = document;
+    const { top, bottom } = this.place.getBoundingClientRect();
+    return this.place.contains(focused) || ((!focused || focused === body) && top < clientHeight && bottom > 0);
   }
 
   begin(number) {
