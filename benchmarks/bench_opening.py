@@ -52,7 +52,9 @@ def main(options: Options) -> None:
             window.add_init_script(WATCH)
             page = window.new_page()
             page.goto((options.book / FRONT).resolve().as_uri())
-            page.wait_for_function("globalThis.when.steered && globalThis.when.moves", timeout=120_000)
+            page.wait_for_function(
+                "globalThis.when.steered && globalThis.when.moves", timeout=120_000
+            )
             for name, its in times.items():
                 its.append(page.evaluate(f"globalThis.when.{name}"))
             window.close()
