@@ -158,7 +158,7 @@ def scatter(
     figure, axes = plt.subplots(figsize=(7, 4.2))
     largest = max(float(np.max(sizes)) for *_, sizes in groups.values()) or 1.0
     for index, (name, (xs, ys, sizes)) in enumerate(groups.items()):
-        areas = 8 + 600 * np.asarray(sizes, dtype=float) / largest
+        areas = 20 + 600 * np.asarray(sizes, dtype=float) / largest
         color = palette.color(name, index)
         axes.scatter(xs, ys, s=areas, color=color, alpha=0.55, lw=0, label=name)
     axes.set(xlabel=x, ylabel=y)
@@ -264,7 +264,7 @@ def fan(paths: Mapping[str, Sequence], truth: Sequence | None = None) -> Figure:
     Parameters
     ----------
     paths : {name: (n, frames, 2) metres, x and z}; one picture each, all at one scale.
-    truth : (frames, 2) metres, drawn over each.
+    truth : (frames, 2) metres, drawn over each, dashed.
     """
     check_named("fan", paths)
     for name, many in paths.items():
@@ -280,7 +280,7 @@ def fan(paths: Mapping[str, Sequence], truth: Sequence | None = None) -> Figure:
         for path in np.asarray(many):
             axes.plot(*path.T, color=color, lw=0.8, alpha=0.5)
         if truth is not None:
-            axes.plot(*np.asarray(truth).T, color=INK, lw=2.5)
+            axes.plot(*np.asarray(truth).T, color=INK, lw=2, ls="--")
         axes.set_title(name, fontsize=10)
         axes.set(xlabel="x (m)", aspect="equal")
     panels[0, 0].set_ylabel("z (m)")
