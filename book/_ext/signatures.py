@@ -7,12 +7,14 @@ elements. Shapes and units stand in the docstring below, so what a call looks li
 """
 
 import re
+from fractions import Fraction
 
 from bs4 import BeautifulSoup, Tag
 from sphinx.application import Sphinx
 
 SIGNATURE = re.compile(r'<dt class="sig sig-object py".*?</dt>', re.DOTALL)
 FUNCTION = re.compile(r"<function ([\w.]+)[^>]*>")
+NUMBER = re.compile(r"\d+\.\d+")
 NAMELESS = re.compile(r"<factory>|<function <lambda>[^>]*>")
 KEPT = {"sig-prename", "sig-name", "viewcode-link", "arguments", "parameter"}
 
@@ -53,7 +55,15 @@ def _argument(parameter: Tag) -> str:
     named = parameter.get_text()
     default = parameter.find(class_="default_value")
     name = re.match(r"\**\w*|/", named)[0]
-    return f"{name}={default.get_text()}" if default else name
+    return f"{name}={_short(default.get_text())}" if default else name
+
+
+def _short(default: str) -> str:
+    """1/30, which Sphinx knows as 0.03333333333333333 only; all else as it is."""
+    if len(default) < 10 or not NUMBER.fullmatch(default):
+        return default
+    simple = Fraction(float(default)).limit_denominator(100)
+    return str(simple) if float(simple) == float(default) else default
 
 
 def _types(soup: BeautifulSoup, given: list[Tag]) -> Tag:

@@ -2,7 +2,7 @@
 
 * A table of more than twenty rows folds, under a line that says how many they are.
 * Counts such as updates, which pandas writes as 500000.0 where a number is missing beside them, are
-  written as 500000; what is missing is a dash, not NaN.
+  written as 500000, and so is 5e+05; -0.0 is 0.0; what is missing is a dash, not NaN.
 * A row whose name begins with ▸ is one that matters, and stands out.
 """
 
@@ -15,6 +15,8 @@ ROWS = 20  # more than these fold
 COUNT = 10  # a column or row of whole numbers, the largest of them at least this, counts something
 FRAME = re.compile(r'<table[^>]*class="dataframe.*?</table>', re.DOTALL)
 NUMBER = re.compile(r"-?\d+(\.\d+)?")
+POWER = re.compile(r"-?\d(\.\d+)?e\+0\d")
+NOTHING = re.compile(r"-0(\.0+)?")
 
 
 def rewrite(body: str) -> str:
@@ -25,6 +27,10 @@ def rewrite(body: str) -> str:
 def _table(table: str) -> str:
     soup = BeautifulSoup(table, "html.parser")
     rows = [row.find_all("td") for row in soup.select("tbody tr")]
+    for cell in soup.find_all("td", string=POWER.fullmatch):
+        cell.string = f"{float(cell.text):.0f}"
+    for cell in soup.find_all("td", string=NOTHING.fullmatch):
+        cell.string = cell.text[1:]
     for cells in [*rows, *zip(*rows, strict=False)]:
         _count(cells)
     for cell in soup.find_all("td", string=re.compile(r"^(nan|NaN|NaT|None)$")):

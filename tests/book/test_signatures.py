@@ -80,3 +80,9 @@ def test_defaults_that_are_no_python_can_be_parsed(signatures):
     assert written == "(rules: Rules = ..., wish: Wish = wishes, enough=...)"
     ast.parse(f"def made{written}: pass")
     assert signatures.parsable(None) is None
+
+
+def test_a_default_that_is_a_fraction_is_one(signatures):
+    page = signatures.rewrite(long(named("step", "float", "0.03333333333333333"), named("rate", "float", "0.1234567891")))  # fmt: skip
+    seen = BeautifulSoup(page, "html.parser").find(class_="arguments").text
+    assert seen == "step=1/30, rate=0.1234567891"

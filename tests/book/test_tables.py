@@ -28,6 +28,11 @@ def test_counts_are_whole_and_what_was_measured_stays(rewrite):
     assert "<td>1374.0</td>" in rewrite(speeds)
 
 
+def test_numbers_are_written_as_people_write_them(rewrite):
+    page = rewrite(pd.DataFrame({"cm": ["1.32e+03", "-0.0", "-0.05", "2e-05"]}).to_html())
+    assert all(f"<td>{its}</td>" in page for its in ("1320", "0.0", "-0.05", "2e-05"))
+
+
 def test_rows_that_matter_stand_out(rewrite):
     table = pd.DataFrame({"cm": [1.5, 2.5]}, index=["plain", "▸ ours"])
     both = pd.concat({"walk": table, "run": table})

@@ -146,7 +146,7 @@ def test_a_disc_for_every_value_and_equal_keys_in_the_legend():
 
 def test_discs_of_size_nothing_are_dots():
     (axes,) = plots.scatter({"a": ([1, 2], [3, 4], [0, 0])}, "x", "y").axes
-    assert (axes.collections[0].get_sizes() == 8).all()
+    assert (axes.collections[0].get_sizes() == 20).all()
 
 
 def test_values_over_time_are_in_seconds():

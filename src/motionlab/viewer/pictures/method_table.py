@@ -35,9 +35,10 @@ class MethodTable:
         return "\n".join([self.frame.to_string(), *self.notes])
 
     def _repr_html_(self) -> str:
-        said = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
         table = self.frame.to_html(border=1)
-        return INTERVAL.sub(r"<td>\1\3<br><small>\2</small></td>", table) + said
+        table = INTERVAL.sub(r"<td>\1\3<br><small>\2</small></td>", table)
+        said = "<br>".join(map(html.escape, self.notes))
+        return f"{table}<p><small>{said}</small></p>" if said else table
 
 
 def method_table(found: Mapping, gait: str = "walk", part: str = "motion") -> MethodTable:
