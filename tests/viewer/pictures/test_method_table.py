@@ -74,8 +74,10 @@ def test_it_is_shown_whole_with_its_floor():
     shown = viewer.method_table(found(12))._repr_html_()
     assert len(re.findall("<tr", shown)) == 12 + 2  # its head, and the floor
     assert 'class="dataframe"' in shown
-    assert "<td>2<br><small>[1.9, 2.1]</small></td>" in shown  # not marked
-    assert "<td>5 *<br><small>[4.9, 5.1]</small></td>" in shown
+    assert (
+        '<td>2<br><small style="white-space: nowrap">[1.9, 2.1]</small></td>' in shown
+    )  # not marked
+    assert '<td>5 *<br><small style="white-space: nowrap">[4.9, 5.1]</small></td>' in shown
 
 
 def test_what_is_not_there_is_said():

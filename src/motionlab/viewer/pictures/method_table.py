@@ -21,6 +21,7 @@ from ...errors import ViewerError
 FLOOR = "real against real"
 PARTS = ("motion", "forecasts", "cost")
 MISSING = "–"
+SMALL = '<small style="white-space: nowrap">'
 INTERVAL = re.compile(r"<td>(\S+) (\[.*?\])( \*)?</td>")
 
 
@@ -36,7 +37,7 @@ class MethodTable:
 
     def _repr_html_(self) -> str:
         table = self.frame.to_html(border=1)
-        table = INTERVAL.sub(r"<td>\1\3<br><small>\2</small></td>", table)
+        table = INTERVAL.sub(r"<td>\1\3<br>" + SMALL + r"\2</small></td>", table)
         said = "<br>".join(map(html.escape, self.notes))
         return f"{table}<p><small>{said}</small></p>" if said else table
 
