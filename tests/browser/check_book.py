@@ -23,7 +23,7 @@ from itertools import product
 from pathlib import Path
 
 from check_access import check_access
-from check_steered import check_steered
+from check_steered import EARLY, check_steered
 from local_server import local_server
 from PIL import Image
 from playwright.sync_api import BrowserContext, Page, TimeoutError, sync_playwright
@@ -190,7 +190,7 @@ class Visit:
             self.trouble(f"{name} shows the same picture wherever its slider stands")
 
     def check_dreams(self) -> None:
-        if self.page.evaluate("'motionlabWeights' in globalThis"):
+        if self.page.evaluate(EARLY):
             self.trouble("weights of a network came with the page; a click loads them")
         for number in range(self.page.locator(DREAM).count()):
             self._check_dream(number)

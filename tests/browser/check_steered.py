@@ -9,6 +9,8 @@ WITHIN = 0.6  # radians off the way that is asked, by which he obeys
 OFF = """f => Math.max(...f.motionlab.steered.characters.map(({ before: { going } }) =>
   Math.abs(Math.atan2(Math.sin(going.bearing - Math.PI / 2), Math.cos(going.bearing - Math.PI / 2)))))"""
 
+EARLY = """'motionlabWeights' in globalThis &&
+  ![...document.querySelectorAll('.motionlab-steer')].some(f => f.motionlab?.content.at_once)"""
 ASK = "all => all.filter(button => !button.disabled && !button.hidden).forEach(button => button.click())"
 
 
