@@ -25,7 +25,6 @@ const watch = () => {
   const player = steer?.motionlab?.player;
   if (player?.frame > 0) when.moves ??= performance.now() / 1000;
   if (steer?.dataset.live !== undefined && !when.steered) {
-    when.loaded ??= performance.now() / 1000;
     player.canvas.dispatchEvent(new KeyboardEvent("keydown", {code: "ArrowUp", key: "ArrowUp", bubbles: true}));
     if (steer.motionlab.commands.used) when.steered = performance.now() / 1000;
   }

@@ -43,8 +43,9 @@ def write_pages(folder: Path) -> None:
         for script in (figure.weights, *figure.others):
             script.write(folder / "_static")
         (folder / f"{name}.html").write_text(PAGE.format(figure.html), encoding="utf-8")
-    broken = pages["page"].html.replace("_static/motionlab-weights", "_static/no-such")
-    (folder / "missing.html").write_text(PAGE.format(broken), encoding="utf-8")
+    for name, page in {"missing": "page", "missing_at_once": "at_once"}.items():
+        broken = pages[page].html.replace("_static/motionlab-weights", "_static/no-such")
+        (folder / f"{name}.html").write_text(PAGE.format(broken), encoding="utf-8")
 
 
 def value(page, of: str):

@@ -272,6 +272,17 @@ def test_without_its_weights_it_says_so(browser, folder):
     window.close()
 
 
+def test_one_that_loads_by_itself_shows_its_clip_where_it_can_not(browser, folder):
+    window = browser.new_context(offline=True)
+    page = window.new_page()
+    page.goto((folder / "missing_at_once.html").as_uri())
+    page.get_by_text("not beside this page").wait_for(timeout=PATIENCE)
+    page.wait_for_selector("figure canvas", timeout=PATIENCE)
+    assert page.locator(".ml-waits").count() == 0
+    assert page.get_by_role("button", name="Load the network").is_enabled()
+    window.close()
+
+
 def test_on_a_phone_stick_and_main_settings_are_in_reach_of_who_sees_him(visit):
     page = visit(viewport={"width": 390, "height": 844}, has_touch=True).page
     load(page)
