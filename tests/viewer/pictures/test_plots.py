@@ -135,7 +135,7 @@ def test_what_cannot_be_drawn_is_said(walk, call, message):
         call(walk)
 
 
-def test_a_disc_for_every_value_and_equal_keys_in_the_legend():
+def test_a_mark_for_every_value_and_equal_keys_in_the_legend():
     (axes,) = plots.scatter({"a": ([1, 2], [3, 4], [1, 9]), "b": ([5], [6], [3])}, "x", "y").axes
     first, second = axes.collections
     assert first.get_offsets().tolist() == [[1, 3], [2, 4]]
@@ -144,9 +144,22 @@ def test_a_disc_for_every_value_and_equal_keys_in_the_legend():
     assert keys[0] == keys[1]
 
 
-def test_discs_of_size_nothing_are_dots():
+def test_marks_of_size_nothing_are_dots_that_one_sees():
     (axes,) = plots.scatter({"a": ([1, 2], [3, 4], [0, 0])}, "x", "y").axes
-    assert (axes.collections[0].get_sizes() == 20).all()
+    assert (axes.collections[0].get_sizes() > 36).all()  # 6 points across
+    assert axes.collections[0].get_edgecolor()[0, 3] == 1  # the colour itself, not half of it
+
+
+def test_clouds_are_told_apart_without_colours():
+    names = ("accad", "bandai", "cmu", "virvig")
+    (axes,) = plots.scatter({name: ([1], [2], [3]) for name in names}, "x", "y").axes
+    shapes = {tuple(map(tuple, its.get_paths()[0].vertices)) for its in axes.collections}
+    assert len(shapes) == len(names)
+
+
+def test_ticks_of_a_logarithmic_axis_are_short():
+    (axes,) = plots.curves({"a": ([31 / 30, 2], [1, 2])}, "s", "m", log=True).axes
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["1.03", "2"]
 
 
 def test_values_over_time_are_in_seconds():

@@ -26,6 +26,8 @@ AROUND_ZERO = ListedColormap(
      for x in np.linspace(-1, 1, 256)]
 )  # fmt: skip
 DASHES = ("-", "--", ":", "-.")  # of lines that have one colour
+SHAPES = ("o", "s", "^", "D", "v", "P")  # of clouds: muted colours alone look alike
+DOT = 45  # the least area of a mark, in square points
 INK = "#808080"  # as the style's text: 4:1 on white and on black
 
 

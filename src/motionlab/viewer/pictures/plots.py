@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from ...errors import ViewerError
@@ -18,7 +19,9 @@ from . import palette
 from .plot_rollouts import pauses, recurrence, survival
 from .plot_style import (
     AROUND_ZERO,
+    DOT,
     INK,
+    SHAPES,
     SPEED,
     check_motion,
     check_named,
@@ -134,7 +137,7 @@ def curves(
     elif log:
         axes.set(xscale="log", yscale="log")
         ticks = sorted({float(value) for xs, _ in lines.values() for value in xs})
-        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
         axes.minorticks_off()
         axes.yaxis.set_major_formatter("{x:g}")
     axes.set(xlabel=x, ylabel=y)
@@ -146,25 +149,28 @@ def curves(
 def scatter(
     groups: Mapping[str, tuple[Sequence[float], Sequence[float], Sequence[float]]], x: str, y: str
 ) -> Figure:
-    """Named clouds of discs ``{name: (xs, ys, sizes)}``; areas grow with the sizes, from a dot for
-    0 to a disc of 9 mm for the largest."""
+    """Named clouds of marks ``{name: (xs, ys, sizes)}``, each cloud of its own colour and shape.
+
+    Areas grow with the sizes, from a dot for 0 to 9 mm across for the largest.
+    """
     check_named("scatter", groups)
     for name, (xs, ys, sizes) in groups.items():
         if not len(xs) == len(ys) == len(sizes) > 0:
             raise ViewerError(
                 f"scatter: {name!r} has {len(xs)} xs, {len(ys)} ys and {len(sizes)} sizes; give one "
-                "of each for every disc."
+                "of each for every mark."
             )
     figure, axes = plt.subplots(figsize=(7, 4.2))
     largest = max(float(np.max(sizes)) for *_, sizes in groups.values()) or 1.0
     for index, (name, (xs, ys, sizes)) in enumerate(groups.items()):
-        areas = 20 + 600 * np.asarray(sizes, dtype=float) / largest
-        color = palette.color(name, index)
-        axes.scatter(xs, ys, s=areas, color=color, alpha=0.55, lw=0, label=name)
+        areas = DOT + 600 * np.asarray(sizes, dtype=float) / largest
+        color, shape = palette.color(name, index), SHAPES[index % len(SHAPES)]
+        look = dict(facecolor=to_rgba(color, 0.6), edgecolor=color, lw=1.3, marker=shape)
+        axes.scatter(xs, ys, s=areas, label=name, **look)
     axes.set(xlabel=x, ylabel=y)
     legend = axes.legend()
     for handle in legend.legend_handles:
-        handle.set_sizes([60])  # not that of the first disc
+        handle.set_sizes([60])  # not that of the first mark
     return figure
 
 
