@@ -2,7 +2,7 @@
 
 * A table of more than twenty rows folds, under a line that says how many they are.
 * Counts such as updates, which pandas writes as 500000.0 where a number is missing beside them, are
-  written as 500000, and so is 5e+05; -0.0 is 0.0; what is missing is a dash, not NaN.
+  written as 500000, and so is 5e+05; -0.0 is 0.0; what is missing is a dash, not NaN; True is yes.
 * A row whose name begins with ▸ is one that matters, and stands out.
 """
 
@@ -12,11 +12,15 @@ from bs4 import BeautifulSoup
 from sphinx.application import Sphinx
 
 ROWS = 20  # more than these fold
-COUNT = 10  # a column or row of whole numbers, the largest of them at least this, counts something
+COUNT = 10  # whole numbers, the largest of them at least this, count something, whatever their unit
 FRAME = re.compile(r'<table[^>]*class="dataframe.*?</table>', re.DOTALL)
 NUMBER = re.compile(r"-?\d+(\.\d+)?")
 POWER = re.compile(r"-?\d(\.\d+)?e\+0\d")
 NOTHING = re.compile(r"-0(\.0+)?")
+UNIT = re.compile(
+    r"\([^()]+\)"
+)  # in a head: what was measured, of which zeros behind the point are told
+WORDS = {"True": "yes", "False": "no"}
 
 
 def rewrite(body: str) -> str:
@@ -31,8 +35,10 @@ def _table(table: str) -> str:
         cell.string = f"{float(cell.text):.0f}"
     for cell in soup.find_all("td", string=NOTHING.fullmatch):
         cell.string = cell.text[1:]
-    for cells in [*rows, *zip(*rows, strict=False)]:
-        _count(cells)
+    for cells, heads in _lines(soup, rows):
+        _count(cells, measured=any(map(UNIT.search, heads)))
+    for cell in soup.find_all("td", string=re.compile("^(True|False)$")):
+        cell.string = WORDS[cell.text]
     for cell in soup.find_all("td", string=re.compile(r"^(nan|NaN|NaT|None)$")):
         cell.string = "–"
     for name in soup.find_all("th", string=re.compile("^▸ ")):
@@ -42,11 +48,38 @@ def _table(table: str) -> str:
     return f'<details class="long"><summary>A table of {len(rows)} rows</summary>{soup}</details>'
 
 
-def _count(cells) -> None:
-    """Take the zeros behind the point off, if all numbers of a row or column are such, and one large."""
-    numbers = [cell for cell in cells if NUMBER.fullmatch(cell.text)]
+def _lines(soup: BeautifulSoup, rows: list) -> list[tuple[list, list[str]]]:
+    """Rows and columns that have numbers: their cells, and the heads of those cells that are numbers."""
+    beside = [" ".join(th.text for th in row.find_all("th")) for row in soup.select("tbody tr")]
+    width = max(map(len, rows), default=0)
+    above = [""] * width
+    for row in soup.select("thead tr"):
+        heads = [th.text for th in row.find_all("th") for _ in range(int(th.get("colspan", 1)))]
+        above = [f"{a} {b}" for a, b in zip(above, heads[-width:], strict=False)]
+    lines = []
+    for head, cells in zip(beside, rows, strict=True):
+        lines.append(
+            (cells, [head, *(a for a, c in zip(above, cells, strict=False) if _number(c))])
+        )
+    for head, cells in zip(above, zip(*rows, strict=False), strict=False):
+        lines.append(
+            (cells, [head, *(b for b, c in zip(beside, cells, strict=True) if _number(c))])
+        )
+    return lines
+
+
+def _number(cell) -> bool:
+    return NUMBER.fullmatch(cell.text) is not None
+
+
+def _count(cells, measured: bool) -> None:
+    """Take the zeros behind the point off, if all numbers of a row or column are such, and nothing that
+    was measured, unless one is large."""
+    numbers = [cell for cell in cells if _number(cell)]
     whole = all(float(cell.text).is_integer() for cell in numbers)
-    if len(numbers) > 1 and whole and max(float(cell.text) for cell in numbers) >= COUNT:
+    if len(numbers) < 2 or not whole:
+        return
+    if not measured or max(float(cell.text) for cell in numbers) >= COUNT:
         for cell in numbers:
             cell.string = cell.text.partition(".")[0]
 

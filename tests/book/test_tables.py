@@ -18,7 +18,7 @@ def test_a_table_of_more_than_twelve_rows_folds(rewrite, rows, folds):
 
 
 def test_counts_are_whole_and_what_was_measured_stays(rewrite):
-    names = ["updates", "seconds", "skate"]
+    names = ["updates", "time (s)", "skate"]
     table = pd.DataFrame([[500000.0, 2.0, 1.5], [3000.0, 3.0, None]], columns=names)
     for page in (rewrite(table.to_html()), rewrite(table.T.to_html())):
         assert "<td>500000</td>" in page and "<td>3000</td>" in page
@@ -26,6 +26,29 @@ def test_counts_are_whole_and_what_was_measured_stays(rewrite):
         assert "<td>–</td>" in page and "NaN" not in page
     speeds = pd.DataFrame({"m": [1374.0, 12.5]}).to_html()
     assert "<td>1374.0</td>" in rewrite(speeds)
+
+
+def test_a_small_count_is_whole_and_a_measure_keeps_its_tenth(rewrite):
+    table = pd.DataFrame({"falls": [7.0, 0.0], "error (cm)": [3.0, 2.0], "ratio": [1.0, 0.5]})
+    for shown in (table, table.T):
+        page = rewrite(shown.to_html())
+        assert "<td>7</td>" in page and "<td>0</td>" in page
+        assert "<td>3.0</td>" in page and "<td>2.0</td>" in page
+        assert "<td>1.0</td>" in page
+
+
+def test_counts_are_found_below_heads_of_two_levels(rewrite):
+    heads = pd.MultiIndex.from_tuples([("walk", "falls"), ("walk", "off (cm)")])
+    rows = pd.MultiIndex.from_tuples([("plain", "one"), ("plain", "two")])
+    table = pd.DataFrame([[1.0, 2.0], [3.0, 4.0]], index=rows, columns=heads)
+    page = rewrite(table.to_html())
+    assert "<td>1</td>" in page and "<td>3</td>" in page
+    assert "<td>2.0</td>" in page and "<td>4.0</td>" in page
+
+
+def test_what_holds_is_yes(rewrite):
+    page = rewrite(pd.DataFrame({"helps": [True, False]}).to_html())
+    assert "<td>yes</td>" in page and "<td>no</td>" in page and "True" not in page
 
 
 def test_numbers_are_written_as_people_write_them(rewrite):
