@@ -6,6 +6,7 @@
 * The search button is named "Search" and says "Search Ctrl+K"; the names of the colour button's
   pictures would do as well as its own.
 * What folds the pages of a subject in the sidebar has no name.
+* All exercises of a page, and their solutions, have one and the same id.
 * A table, a formula or a line of code that is wider than the page scrolls, but not by keys.
 
 What is left is seen by tests/browser/check_access.py.
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from sphinx.application import Sphinx
 
+EXERCISE = re.compile(r'<section id="(exercise|solution)-content">')
 UNNAMED = re.compile(r'alt="(\.\./)*_images/[0-9a-f]{32,}\.\w+"')
 REACHED = """
 addEventListener("DOMContentLoaded", () => {
@@ -57,6 +59,7 @@ def rewrite(body: str) -> str:
     """The same HTML without these faults."""
     body = body.replace('<summary aria-label="Toggle hidden content">', "<summary>")
     body = body.replace('<div role="list" class="citation-list">', '<div class="citation-list">')
+    body = EXERCISE.sub("<section>", body)
     return UNNAMED.sub('alt="A picture that the code above draws"', body)
 
 

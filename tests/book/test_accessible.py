@@ -21,6 +21,12 @@ def test_references_are_no_list(accessible):
     )
 
 
+def test_no_two_exercises_have_one_id(accessible):
+    two = '<section id="exercise-content">a</section><section id="solution-content">b</section>'
+    assert accessible.rewrite(two) == "<section>a</section><section>b</section>"
+    assert accessible.rewrite('<section id="exercises">') == '<section id="exercises">'
+
+
 def test_a_picture_is_not_called_by_its_file(accessible):
     path = f"../_images/{'0a' * 30}.png"
     named = f'<img alt="Two walks" src="{path}">'
