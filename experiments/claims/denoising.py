@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .verdict import NOT, PARTLY, REPRODUCED, UNTESTABLE, Absent, Verdict
+from .verdict import GONE, NOT, PARTLY, REPRODUCED, UNTESTABLE, Absent, Verdict
 
 GAITS = ("walking", "running")
 ERROR, SKATE = "joint error (cm)", "foot skate (cm/s)"
@@ -95,7 +95,7 @@ def w8_cases(limits: dict, found: dict) -> Verdict:
     if "cases" not in found:
         raise Absent("the result there was made before there were cases")
     cases = found["cases"]
-    numbers = {"clips with a hop": cases["clips"], "of": found["clips"]}
+    numbers = {"clips with a hop": f"{cases['clips']} of {found['clips']}"}
     if cases["clips"] < limits["clips"]:
         return Verdict(UNTESTABLE, numbers, "there are hardly any hops to remove")
     hop = cases["hop (m/s²)"]
@@ -127,7 +127,7 @@ def _removed(limits: dict, zero: float, estimated: float, worst: float, numbers:
     if zero < limits["hop"]:
         return Verdict(UNTESTABLE, numbers, "there is no hop to remove")
     gone = (zero - estimated) / (zero - 1)
-    numbers |= {"gone": gone}
+    numbers |= {GONE: gone}
     if worst <= limits["smooth"]:
         return Verdict(REPRODUCED, numbers)
     return Verdict(PARTLY if gone >= limits["part"] else NOT, numbers)

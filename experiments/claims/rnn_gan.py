@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from .verdict import NOT, PARTLY, REPRODUCED, UNTESTABLE, Absent, Verdict
+from .verdict import GONE, NOT, PARTLY, REPRODUCED, UNTESTABLE, Absent, Verdict
 
 # -- W1 -------------------------------------------------------------------------------------------
 
@@ -356,7 +356,7 @@ def w8(limits: dict, found: dict) -> Verdict:
     if max(estimated, after) <= limits["smooth"]:
         return Verdict(REPRODUCED, numbers)
     gone = (zero - estimated) / (zero - 1)
-    return Verdict(PARTLY if gone >= limits["part"] else NOT, numbers | {"gone": gone})
+    return Verdict(PARTLY if gone >= limits["part"] else NOT, numbers | {GONE: gone})
 
 
 def w10(limits: dict, found: dict) -> Verdict:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
 UNTESTABLE, OPEN = "not testable here", "open"
+GONE = "part of the excess that is gone (1 is all of it)"  # a number of W8's verdicts
 VERDICTS = (REPRODUCED, PARTLY, NOT, UNTESTABLE, OPEN)
 
 

@@ -52,7 +52,8 @@ def show(
     bones lie is known, not how they are twisted, and they keep the skeleton's lengths.
 
     A body of no person's size is drawn magnified, its floor and its way with it, and the player tells
-    how far apart the floor's lines are. Bodies that are shown together are magnified alike.
+    how far apart the floor's lines are. Bodies that are shown together are magnified alike. What sinks
+    below the floor is hidden but for a thin broken outline.
 
     Parameters
     ----------
