@@ -165,7 +165,7 @@ def scatter(
     for index, (name, (xs, ys, sizes)) in enumerate(groups.items()):
         areas = DOT + 600 * np.asarray(sizes, dtype=float) / largest
         color, shape = palette.color(name, index), SHAPES[index % len(SHAPES)]
-        look = dict(facecolor=to_rgba(color, 0.6), edgecolor=color, lw=1.3, marker=shape)
+        look = dict(facecolor=to_rgba(color, 0.45), edgecolor=color, lw=1.3, marker=shape)
         axes.scatter(xs, ys, s=areas, label=name, **look)
     axes.set(xlabel=x, ylabel=y)
     legend = axes.legend()
