@@ -95,7 +95,7 @@ def w8_cases(limits: dict, found: dict) -> Verdict:
     if "cases" not in found:
         raise Absent("the result there was made before there were cases")
     cases = found["cases"]
-    numbers = {"clips with a hop": f"{cases['clips']} of {found['clips']}"}
+    numbers = {"clips with a hop": cases["clips"], "clips in all": found["clips"]}
     if cases["clips"] < limits["clips"]:
         return Verdict(UNTESTABLE, numbers, "there are hardly any hops to remove")
     hop = cases["hop (m/s²)"]
