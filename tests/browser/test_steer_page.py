@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import groupby
 
 import pytest
 from steered_pages import PATIENCE, SECOND, frames_pass, load, settled, until, value, write_pages
@@ -113,11 +114,11 @@ def test_a_delay_lets_him_hear_late(visit):
           const [asked, steer] = [commands.asked.bind(commands), steered.steer.bind(steered)];
           const note = (list, wish) => {
             const way = wish.speed ? Math.round(wish.direction * 180 / Math.PI) : "stand";
-            if (list.at(-1)?.[0] !== way) list.push([way, player.clock.time]);
+            list.push([player.clock.time, way]);
             return wish;
           };
           Object.assign(window, { said: [], heard: [] });
-          commands.asked = (view) => note(said, asked(view));
+          commands.asked = (view) => note(said, asked(view)); // once a picture
           steered.steer = (wish) => steer(note(heard, wish));
         }"""
     )
@@ -130,12 +131,13 @@ def test_a_delay_lets_him_hear_late(visit):
     page.keyboard.up("ArrowLeft")
     frames_pass(page, SECOND)
     said, heard = page.evaluate("[said, heard]")
-    ways = [way for way, _ in said]
+    ways = [way for way, _ in groupby(way for _, way in said)]
     assert ways[:3] == ["stand", 0, 45] and ways[-1] == "stand"
-    assert [way for way, _ in heard] == ways
-    late = [after - before for (_, before), (_, after) in zip(said[1:], heard[1:], strict=True)]
-    assert all(15 <= frames < 15 + SECOND for frames in late), late
-    assert min(late) < 18  # the next picture
+    # However few pictures a busy machine draws: at each, what was said half a second or more before.
+    late = {now: [way for at, way in said if at <= now - 15] for now, _ in said}
+    expected = [[now, ways[-1]] for now, ways in late.items() if ways]
+    assert [found for found in heard if found[0] >= said[0][0] + 15] == expected
+    assert {way for _, way in expected} >= {"stand", 0, 45} and expected[-1][1] == "stand"
     page.locator("p[role=status]").filter(has_text="seen after 0.").wait_for(timeout=PATIENCE)
     least = page.locator("p[role=status]").inner_text().split("after ")[1].split(" ")[0]
     assert float(least) == pytest.approx(0.5 + value(page, "steered.latency[0]"), abs=0.01)
