@@ -28,8 +28,8 @@ CASES = [
     ("W5", "partly", following(finished=0.9)),
     ("W5", "partly", following(ours=(0.7, 3.0))),
     ("W5", "partly", following(circle=3.0)),
-    ("W5", "not", following(circle=3.0, high=1.1)),
-    ("W5", "not", following(high=1.1)),
-    ("W5", "not", following(ours=(3.0, 3.0), circle=3.0, high=1.1)),
+    ("W5", "not reproduced", following(circle=3.0, high=1.1)),
+    ("W5", "not reproduced", following(high=1.1)),
+    ("W5", "not reproduced", following(ours=(3.0, 3.0), circle=3.0, high=1.1)),
     ("W5", "open", following(seeds=2)),
 ]

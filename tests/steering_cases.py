@@ -34,8 +34,8 @@ CASES = [
     ("W6", "partly", steering(alive=0.9)),
     ("W6", "partly", steering(broken=3)),
     ("W6", "partly", steering(pace=None)),
-    ("W6", "not", steering(late="179° right")),
-    ("W6", "not", steering(settled=2.5)),
-    ("W6", "not", steering(fps=20.0)),
+    ("W6", "not reproduced", steering(late="179° right")),
+    ("W6", "not reproduced", steering(settled=2.5)),
+    ("W6", "not reproduced", steering(fps=20.0)),
     ("W6", "open", steering(seeds=5)),
 ]

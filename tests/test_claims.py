@@ -174,52 +174,52 @@ STEADY, LIVELY = (50, 51, 52), (1.2, 1.2, 1.2)
 CASES = [
     ("W1-variety", "reproduced", variety([1.0] * 6)),
     ("W1-variety-memory", "reproduced", variety([1.0] * 6)),
-    ("W1-variety-memory", "not", variety([0.9] * 6)),
+    ("W1-variety-memory", "not reproduced", variety([0.9] * 6)),
     ("W1-variety", "partly", variety([2.0] * 6, sound=0.8)),
     ("W1-variety", "partly", variety([1.2] * 3 + [0.9] * 3)),
-    ("W1-variety", "not", variety([9.0] * 2 + [0.9] * 4)),
+    ("W1-variety", "not reproduced", variety([9.0] * 2 + [0.9] * 4)),
     ("W1-endless", "reproduced", endless(0.95, 0.86)),
     ("W1-endless", "partly", endless(0.94)),
     ("W1-endless", "partly", endless(drift=0.84)),
     ("W1-endless", "partly", endless(loops=0.06)),
-    ("W1-endless", "not", endless(0.49)),
+    ("W1-endless", "not reproduced", endless(0.49)),
     ("W1-endless", "open", endless(rollouts=8)),
     ("W1-endless", "open", endless(seconds=60.0)),
     ("W1-likeness", "reproduced", likeness(1.14, 0.91)),
     ("W1-likeness", "partly", likeness(1.16, 0.91)),
-    ("W1-likeness", "not", likeness(1.16, 0.89)),
-    ("W1-likeness", "not", likeness(failed=0.06)),
+    ("W1-likeness", "not reproduced", likeness(1.16, 0.89)),
+    ("W1-likeness", "not reproduced", likeness(failed=0.06)),
     ("W1-novelty", "reproduced", novelty(0.05, 1.5)),
     ("W1-novelty", "partly", novelty(0.9, 1.0)),
     ("W1-novelty", "partly", novelty(0.0, 2.0)),
-    ("W1-novelty", "not", novelty(0.9, 2.0)),
+    ("W1-novelty", "not reproduced", novelty(0.9, 2.0)),
     ("W2-noise", "reproduced", noise(((60, 60, 60), LIVELY), (STEADY, LIVELY))),
     ("W2-noise", "reproduced", noise((STEADY, (1.1, 0.95, 1.1)), (STEADY, LIVELY))),
     ("W2-noise", "partly", noise(((60, 60, 51.5), LIVELY), (STEADY, LIVELY))),
     ("W2-noise", "partly", noise(((60, 60, 60), (1.5, 1.5, 1.5)), (STEADY, LIVELY))),
-    ("W2-noise", "not", noise((STEADY, LIVELY), (STEADY, LIVELY))),
-    ("W2-noise", "not", noise((STEADY, LIVELY), ((60, 60, 60), LIVELY))),
+    ("W2-noise", "not reproduced", noise((STEADY, LIVELY), (STEADY, LIVELY))),
+    ("W2-noise", "not reproduced", noise((STEADY, LIVELY), ((60, 60, 60), LIVELY))),
     ("W2-noise", "open", recipe(table=(STEADY, LIVELY, (0, 0, 0)))),
     ("W2-rate", "partly", rates((10, 10, 10))),
-    ("W2-rate", "not", rates((60, 60, 60))),
+    ("W2-rate", "not reproduced", rates((60, 60, 60))),
     ("W2-optimiser", "reproduced", optimisers((50, 51, 52), (40, 45, 49))),
     ("W2-optimiser", "partly", optimisers((50, 51, 52), (40, 45, 50.5))),
-    ("W2-optimiser", "not", optimisers((50, 51, 52), (49.5, 50.5, 51.5))),
+    ("W2-optimiser", "not reproduced", optimisers((50, 51, 52), (49.5, 50.5, 51.5))),
     ("W2-pretraining", "reproduced", actors((5, 5, 5), LIVELY)),
     ("W2-pretraining", "partly", actors((5, 5, 5), (1.5, 1.5, 1.5))),
     ("W2-pretraining", "partly", actors((1, 2, 3), (1, 1, 1))),
-    ("W2-pretraining", "not", actors((1, 2, 3), LIVELY)),
+    ("W2-pretraining", "not reproduced", actors((1, 2, 3), LIVELY)),
     ("W4-generator", "reproduced", fit(1, 2), likeness(skate=2.0), likeness(skate=1.7)),
     ("W4-generator", "partly", fit(-1, 2), likeness(skate=2.0), likeness(skate=1.7)),
-    ("W4-generator", "not", fit(-1, 2), likeness(skate=2.0), likeness(skate=1.9)),
+    ("W4-generator", "not reproduced", fit(-1, 2), likeness(skate=2.0), likeness(skate=1.9)),
     ("W8", "not testable here", hops(1.2, 1.0, 1.0)),
     ("W8", "reproduced", hops(2.0, 1.1, 1.1)),
     ("W8", "partly", hops(2.0, 1.1, 1.3)),
     ("W8", "partly", hops(2.0, 1.5, 1.0)),
-    ("W8", "not", hops(2.0, 1.6, 1.0)),
+    ("W8", "not reproduced", hops(2.0, 1.6, 1.0)),
     ("W10", "reproduced", sizes(300, 30, 11)),
     ("W10", "partly", sizes(300, 30, 9)),
-    ("W10", "not", sizes(9, 9, 9)),
+    ("W10", "not reproduced", sizes(9, 9, 9)),
     *aclstm_cases.CASES,
     *comparison_cases.CASES,
     *refiner_cases.CASES,
@@ -249,7 +249,9 @@ def test_every_rule_can_say_yes_and_no():
         if identity == "W9":  # which asks for people
             assert said == {"not testable here", "open"}
             continue
-        assert {"not", "partly" if identity == "W2-rate" else "reproduced"} <= said, identity
+        assert {"not reproduced", "partly" if identity == "W2-rate" else "reproduced"} <= said, (
+            identity
+        )
 
 
 def test_a_network_that_says_one_thing_only_has_no_variety(tmp_path):
@@ -257,7 +259,7 @@ def test_a_network_that_says_one_thing_only_has_no_variety(tmp_path):
     claim = claim_of("W1-variety")
     for ratios, sound in (([0.0] * 6, 1.0), ([0.0] * 6, 0.0)):
         found = rnn_gan.w1_variety(claim["limits"], variety(ratios, sound))
-        assert found.verdict == "not"
+        assert found.verdict == "not reproduced"
     assert rnn_gan.w1_variety(claim["limits"], variety([9.0] * 6, 0.0)).verdict == "partly"
 
 
@@ -309,7 +311,9 @@ def test_a_training_that_fell_apart_counts_as_the_worst():
     assert rnn_gan.w2_optimiser(claim_of("W2-optimiser")["limits"], recipe).verdict == "reproduced"
     rows = {"table": {"runs": [ruined] * 3}, "no noise": {"runs": [{
         "seconds until failure": 9.0, "acceleration over data": 1.1}] * 3}}  # fmt: skip
-    assert rnn_gan.w2_noise(claim_of("W2-noise")["limits"], {"rows": rows}).verdict == "not"
+    assert (
+        rnn_gan.w2_noise(claim_of("W2-noise")["limits"], {"rows": rows}).verdict == "not reproduced"
+    )
 
 
 def test_verdicts_are_printed(capsys):

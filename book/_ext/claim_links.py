@@ -31,17 +31,15 @@ addEventListener("DOMContentLoaded", openClaim);
 
 
 def judged() -> list[tuple[dict, str, str, str]]:
-    """Each claim with its verdict in words, the class of its badge, and what must be said with it."""
+    """Each claim with its verdict, the class of its badge, and what must be said with it."""
     if str(ROOT) not in sys.path:
         sys.path.insert(0, str(ROOT))
-    from experiments.claims import verdict, verdicts
+    from experiments.claims import verdicts
 
     found = []
     for claim in verdicts.claims():
         its = verdicts.judge(claim)
-        ruling = "not reproduced" if its.verdict == verdict.NOT else its.verdict
-        badge = "untestable" if its.verdict == verdict.UNTESTABLE else its.verdict
-        found.append((claim, ruling, badge, its.remark))
+        found.append((claim, its.verdict, verdicts.BADGES[its.verdict], its.remark))
     return found
 
 

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not"
+REPRODUCED, PARTLY, NOT = "reproduced", "partly", "not reproduced"
 UNTESTABLE, OPEN = "not testable here", "open"
+BADGES = {  # classes of their badges in the book
+    REPRODUCED: "reproduced",
+    PARTLY: "partly",
+    NOT: "not",
+    UNTESTABLE: "untestable",
+    OPEN: "open",
+}
+VERDICTS = tuple(BADGES)
 GONE = "part of the excess that is gone (1 is all of it)"  # a number of W8's verdicts
-VERDICTS = (REPRODUCED, PARTLY, NOT, UNTESTABLE, OPEN)
 
 
 class Verdict(NamedTuple):

@@ -16,10 +16,10 @@ from pathlib import Path
 import yaml
 
 from . import aclstm, comparison, denoising, rnn_gan, strnn
-from .verdict import NOT, OPEN, UNTESTABLE, VERDICTS, Absent, Verdict
+from .verdict import BADGES, NOT, OPEN, VERDICTS, Absent, Verdict
 
 __all__ = [
-    "NOT", "UNTESTABLE", "VERDICTS", "Verdict", "claims", "judge", "results_of", "rule_of",
+    "BADGES", "NOT", "VERDICTS", "Verdict", "claims", "judge", "results_of", "rule_of",
 ]  # fmt: skip
 
 ROOT = Path(__file__).resolve().parents[2]
