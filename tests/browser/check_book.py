@@ -2,7 +2,7 @@
 
     python tests/browser/check_book.py [book/_build/html]
 
-Each page is opened from disk and from a local server, on a desktop and on a phone. It fails if a
+Each page is opened from disk, on a desktop and on a phone, and from a local server. It fails if a
 page asks anything of another machine, logs an error, scrolls sideways at 390 px or weighs too much;
 if a formula stays TeX; if a player stands still, does not follow its slider or saves nothing; if a
 scene stays empty or does not follow its own; if a network does not load and move, or too slowly; if a
@@ -19,7 +19,6 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from itertools import product
 from pathlib import Path
 
 from check_access import check_access
@@ -343,12 +342,11 @@ def check(folder: Path, served: bool = True, at_once: int = 1) -> list[str]:
     # Who visits a page that sends on would look at the next one before it is whole.
     pages = [p for p in pages if not SENDS_ON.search(p.read_text(encoding="utf-8"))]
     with local_server(folder) as server:
-        bases = (folder.as_uri() + "/", server)[: 1 + served]
+        disk = folder.as_uri() + "/"
         tasks = []
-        for base, size in product(bases, (DESKTOP, PHONE)):
-            # Listings of source code are all alike: the narrow window, from disk, is enough.
-            listings = base.startswith("file:") and size == PHONE
-            opened = [p for p in pages if listings or "_modules" not in p.parts]
+        for base, size in ((disk, DESKTOP), (disk, PHONE), (server, DESKTOP))[: 2 + served]:
+            # Listings of source code are all alike: the narrow window is enough.
+            opened = [p for p in pages if size == PHONE or "_modules" not in p.parts]
             tasks += [(folder, base, size, opened[i::at_once], not i) for i in range(at_once)]
         if at_once == 1:
             return troubles + [trouble for task in tasks for trouble in check_pages(*task)]
