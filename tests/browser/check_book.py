@@ -40,10 +40,10 @@ FLAGS = [  # WebGL in software: the machine that checks may have no graphics car
 ]
 PLAYER, SCENE, DREAM = ".motionlab-player", ".motionlab-scene iframe", ".motionlab-dream"
 PATH = ".motionlab-path"
-# shares of a board's width and height
-STROKE = ((0.25, 0.75), (0.35, 0.3), (0.6, 0.6), (0.75, 0.25))
+STROKE = ((0.25, 0.75), (0.35, 0.3), (0.6, 0.6), (0.75, 0.25))  # shares of a board
 WEIGHTS_BYTES = 8e6  # of a network that a page loads on a click
 STEP = 1000 / 30  # milliseconds that a network may take for a frame
+LISTINGS = 10  # of source code, all alike: the longest of them, in the narrow window
 EACH = 1000  # figure of a page; more than any has
 SENDS_ON = re.compile(r'<meta http-equiv="Refresh" content="0; url=([^"]+)"')
 CONTRAST = 40  # of 255 levels of grey: less between the darkest and the lightest is nothing drawn
@@ -341,12 +341,14 @@ def check(folder: Path, served: bool = True, at_once: int = 1) -> list[str]:
     troubles = [line for p in pages if (line := leads_nowhere(p, folder))]
     # Who visits a page that sends on would look at the next one before it is whole.
     pages = [p for p in pages if not SENDS_ON.search(p.read_text(encoding="utf-8"))]
+    listings = {p for p in pages if "_modules" in p.parts}
+    longest = sorted(listings, key=lambda p: p.stat().st_size)[-LISTINGS:]
+    pages = [p for p in pages if p not in listings]
     with local_server(folder) as server:
         disk = folder.as_uri() + "/"
         tasks = []
         for base, size in ((disk, DESKTOP), (disk, PHONE), (server, DESKTOP))[: 2 + served]:
-            # Listings of source code are all alike: the narrow window is enough.
-            opened = [p for p in pages if size == PHONE or "_modules" not in p.parts]
+            opened = pages + longest * (size == PHONE)
             tasks += [(folder, base, size, opened[i::at_once], not i) for i in range(at_once)]
         if at_once == 1:
             return troubles + [trouble for task in tasks for trouble in check_pages(*task)]
