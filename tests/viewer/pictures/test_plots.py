@@ -37,6 +37,12 @@ def test_curves_hold_their_data():
     assert axes.get_xlabel() == "fps" and axes.get_xscale() == "log"
 
 
+def test_a_line_of_many_values_has_no_marks():
+    lines = {name: (range(count), range(count)) for name, count in (("few", 9), ("many", 99))}
+    few, many = plots.curves(lines, x="frame", y="m/s").axes[0].lines
+    assert few.get_marker() == "o" and many.get_marker() == "None"
+
+
 def test_curves_may_have_one_logarithmic_axis():
     (axes,) = plots.curves({"one": ([1, 10], [0, 20])}, x="frame", y="m/s", log="x").axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")

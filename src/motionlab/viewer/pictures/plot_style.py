@@ -27,6 +27,7 @@ AROUND_ZERO = ListedColormap(
 )  # fmt: skip
 DASHES = ("-", "--", ":", "-.")  # of lines that have one colour
 SHAPES = ("o", "s", "^", "D", "v", "P")  # of clouds: muted colours alone look alike
+MARKED = 40  # values of a line that each get a mark; more would hide the line
 DOT = 45  # the least area of a mark, in square points
 INK = "#808080"  # as the style's text: 4:1 on white and on black
 

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ...errors import ViewerError
 from ...motion import Motion
@@ -21,6 +22,7 @@ from .plot_style import (
     AROUND_ZERO,
     DOT,
     INK,
+    MARKED,
     SHAPES,
     SPEED,
     check_motion,
@@ -121,7 +123,8 @@ def curves(
     y: str,
     log: bool | str = False,
 ) -> Figure:
-    """Named lines ``{name: (xs, ys)}`` over labelled axes, with a mark at every value.
+    """Named lines ``{name: (xs, ys)}`` over labelled axes, with a mark at every value of
+    a line that has at most MARKED.
 
     log : True for two logarithmic axes, "x" for one.
 
@@ -130,7 +133,7 @@ def curves(
     check_named("curves", lines)
     figure, axes = plt.subplots()
     for look, (name, (xs, ys)) in zip(line_looks(list(lines)), lines.items(), strict=True):
-        axes.plot(xs, ys, "o", label=name, **look)
+        axes.plot(xs, ys, marker="o" if len(xs) <= MARKED else None, label=name, **look)
     if log == "x":
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
@@ -289,6 +292,7 @@ def fan(paths: Mapping[str, Sequence], truth: Sequence | None = None) -> Figure:
             axes.plot(*np.asarray(truth).T, color=INK, lw=2, ls="--")
         axes.set_title(name, fontsize=10)
         axes.set(xlabel="x (m)", aspect="equal")
+        axes.xaxis.set_major_locator(MaxNLocator(4))  # their numbers are wide, and panels narrow
     panels[0, 0].set_ylabel("z (m)")
     return figure
 
