@@ -10,7 +10,7 @@ from motionlab.viewer.live.player import bundle_path
 from motionlab.viewer.live.show import show
 
 pytest.importorskip("check_book", exc_type=ImportError)
-from player_pages import PAGE, opened, waving  # noqa: E402
+from player_pages import PAGE, first, opened, waving  # noqa: E402
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -60,5 +60,69 @@ def test_a_cursor_in_the_chart_follows_the_player_and_leads_it(browser, page_fil
         page.mouse.click(box["x"] + box["width"] / 2, box["y"] + 20)
         assert abs(page.evaluate(f"{player}.frame") - 149) <= 2
         assert page.get_by_role("img", name="height (cm), over time: toe").count() == 1
+        page.set_viewport_size({"width": 390, "height": 700})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_a_line_that_is_clicked_is_the_motion_that_plays(browser, page_file):
+    high, low, gone = [9.0] * 300, [1.0] * 300, [5.0] * 100 + [float("nan")] * 200
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOTIONLAB_VIEWER", "page")
+        made = show([waving(), waving().mirror(), waving()[:100]], labels=["a", "b", "c"], choose="walk",
+                    chart={"a": high, "b": low, "c": gone}, chart_label="speed (m/s)", height=240)  # fmt: skip
+    file = page_file.with_name("picks.html")
+    file.write_text(PAGE.format(made.html), encoding="utf-8")
+    with opened(browser, file, reduced_motion="reduce") as page:
+        figure = first(page)
+        figure.locator(".ml-label").wait_for()
+        assert figure.locator(".ml-label").inner_text() == "a"
+        assert figure.get_by_role("slider").count() == 1  # time's alone
+        player = "document.querySelector('figure').motionlab"
+        box = figure.locator(".ml-overtime-plot").bounding_box()
+
+        def click(across, down):
+            place = [box["x"] + across * box["width"], box["y"] + down * box["height"]]
+            page.mouse.click(*place)
+            return page.evaluate(f"[{player}.chosen, {player}.playing, {player}.frame]")
+
+        chosen, playing, frame = click(0.5, 0.8)
+        assert (chosen, playing) == (1, True) and frame >= 148
+        page.wait_for_function("document.querySelector('.ml-label').textContent === 'b'")
+        bold = "line => getComputedStyle(line).strokeWidth"
+        assert figure.locator(".ml-picked").count() == 1
+        assert figure.locator(".ml-picked").evaluate(bold) == "3.5px"
+        page.wait_for_function(f"{player}.frame > {frame}")
+        assert click(0.1, 0.5)[:2] == [2, True]
+        assert click(0.9, 0.1)[:2] == [0, True]  # where the shorter one is no more
+        page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.8 * box["height"])
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.8 * box["height"])
+        page.mouse.up()
+        dragged = page.evaluate(f"[{player}.chosen, {player}.playing]")
+        assert dragged == [0, False]  # through time, at the same line
+
+
+def test_the_names_of_lines_choose_as_a_click_does(browser, page_file):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MOTIONLAB_VIEWER", "page")
+        figures = [
+            show([waving(), waving().mirror()], labels=["a", "b"], choose="walk",
+                 chart={"a": [1.0] * 300, "b": [2.0] * 300}, height=240)
+            for _ in range(2)
+        ]  # fmt: skip
+    file = page_file.with_name("names.html")
+    file.write_text(PAGE.format("".join(figure.html for figure in figures)), encoding="utf-8")
+    with opened(browser, file, reduced_motion="reduce") as page:
+        page.wait_for_selector(".ml-label")
+        group, other = (page.get_by_role("radiogroup", name="walk").nth(i) for i in (0, 1))
+        group.get_by_role("radio", name="a").focus()
+        page.keyboard.press("ArrowRight")
+        page.wait_for_function("document.querySelector('.ml-label').textContent === 'b'")
+        assert group.get_by_role("radio", name="b").is_checked()
+        assert other.get_by_role("radio", name="a").is_checked()  # a group of its own
+        states = "[...document.querySelectorAll('figure')].map((f) => f.motionlab.playing)"
+        assert page.evaluate(states) == [True, False]
+        page.evaluate("document.querySelector('figure').motionlab.set('chosen', 0)")
+        assert group.get_by_role("radio", name="a").is_checked()
         page.set_viewport_size({"width": 390, "height": 700})
         assert page.evaluate("document.documentElement.scrollWidth") <= 390

@@ -56,7 +56,7 @@ export class Bar {
     this.save.setAttribute("aria-expanded", "false");
     this.overlay.hidden = !several;
     this.element.append(this.play, this.slider, this.time, this.speed, this.follow, this.overlay, this.reset, this.save);
-    if (player.payload?.choose) this.element.append(this.chooser(player));
+    if (player.payload?.choose && !player.payload.chart?.picks) this.element.append(this.chooser(player));
     this.element.append(this.saving.element);
   }
 

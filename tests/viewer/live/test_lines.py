@@ -26,6 +26,20 @@ def test_lines_are_sent_with_gaps_where_nothing_is_known():
     player.close()
 
 
+def test_lines_named_as_the_motions_belong_to_them():
+    walks = [gaits.make(seconds=0.1)] * 2
+    named = {"labels": ["a", "b"], "colors": ["acLSTM", "RNN"], "choose": "start"}
+    sent = show(walks, **named, chart={"b": [2.0], "a": [1.0]}).payload["chart"]
+    assert sent["picks"] and [line["values"] for line in sent["lines"]] == [[1.0], [2.0]]
+    assert [line["color"] for line in sent["lines"]] == [
+        palette.color(n) for n in ("acLSTM", "RNN")
+    ]
+    for lines in ({"a": [1.0]}, {"a": [1.0], "c": [1.0]}, {"a": [1.0], "b": [1.0], "c": [1.0]}):
+        assert "picks" not in show(walks, **named, chart=lines).payload["chart"]
+    named.pop("choose")
+    assert "picks" not in show(walks, **named, chart={"a": [1.0], "b": [2.0]}).payload["chart"]
+
+
 @pytest.mark.parametrize(
     ("named", "says"),
     [

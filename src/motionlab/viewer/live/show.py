@@ -69,7 +69,8 @@ def show(
     chosen : number of the motion that is seen at first, then.
     focus : "body", or "feet": at first the camera stands near the ground and sees the legs alone.
     chart : named lines of one value a frame, below the picture, with a cursor that follows the player
-        and can be dragged; NaN leaves a gap.
+        and can be dragged; NaN leaves a gap. With `choose`, and lines named as the motions: a click on
+        a line plays its motion from there, and the lines' names take the place of the slider.
     chart_label, chart_log : what the lines are and their unit; a logarithmic axis.
     caption : a text below the player.
     height : of the picture, pixels.
@@ -105,6 +106,8 @@ def show(
             )
     longest = max(len(track.positions) for track in tracks)
     lines = _chart(chart_label, chart, longest, chart_log)
+    if lines is not None and choose is not None:
+        lines |= _own_lines(lines["lines"], tracks)
     data = payload(
         tracks,
         rate,
@@ -323,6 +326,15 @@ def _chart(
         said = [float(f"{v:.4g}") if ok else None for v, ok in zip(row, drawn, strict=True)]
         sent.append({"name": str(name), "color": color(name, index), "values": said})
     return {"label": label or "", "log": log, "lines": sent}
+
+
+def _own_lines(lines: list[dict[str, Any]], tracks: Sequence[Track]) -> dict[str, Any]:
+    """Lines that are named as the motions, in their order and colours: a reader may pick one."""
+    named = {line["name"]: line for line in lines}
+    if sorted(named) != sorted(track.label for track in tracks):
+        return {}
+    owned = [{**named[track.label], "color": track.color} for track in tracks]
+    return {"picks": True, "lines": owned}
 
 
 def still_picture(track: Track) -> str:
