@@ -83,7 +83,7 @@ export class Chart {
 
   /** The names as a choice of one: what a click on a line does, for keys. */
   choices(names) {
-    const group = make("div", "ml-overtime-names");
+    const group = make("div", "ml-choices");
     group.setAttribute("role", "radiogroup");
     group.setAttribute("aria-label", this.player.payload.choose);
     groups += 1;
