@@ -17,9 +17,7 @@ FRAME = re.compile(r'<table[^>]*class="dataframe.*?</table>', re.DOTALL)
 NUMBER = re.compile(r"-?\d+(\.\d+)?")
 POWER = re.compile(r"-?\d(\.\d+)?e\+0\d")
 NOTHING = re.compile(r"-0(\.0+)?")
-UNIT = re.compile(
-    r"\([^()]+\)"
-)  # in a head: what was measured, of which zeros behind the point are told
+UNIT = re.compile(r"\([^()]+\)")  # in a head: what was measured keeps zeros behind its point
 WORDS = {"True": "yes", "False": "no"}
 
 
