@@ -37,6 +37,11 @@ def test_curves_hold_their_data():
     assert axes.get_xlabel() == "fps" and axes.get_xscale() == "log"
 
 
+def test_logarithmic_axes_name_their_values_in_plain_digits():
+    (axes,) = plots.curves({"one": ([1.03333, 1500], [1, 2])}, x="s", y="m", log=True).axes
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["1.03", "1500"]
+
+
 def test_a_line_of_many_values_has_no_marks():
     lines = {name: (range(count), range(count)) for name, count in (("few", 9), ("many", 99))}
     few, many = plots.curves(lines, x="frame", y="m/s").axes[0].lines

@@ -140,7 +140,7 @@ def curves(
     elif log:
         axes.set(xscale="log", yscale="log")
         ticks = sorted({float(value) for xs, _ in lines.values() for value in xs})
-        axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+        axes.set_xticks(ticks, [f"{tick:g}" if tick >= 100 else f"{tick:.3g}" for tick in ticks])
         axes.minorticks_off()
         axes.yaxis.set_major_formatter("{x:g}")
     axes.set(xlabel=x, ylabel=y)
