@@ -201,6 +201,12 @@ def test_a_fan_draws_every_path_and_the_true_one():
     assert left.get_xlim() == right.get_xlim()
 
 
+def test_a_fan_of_one_path_draws_it_over_the_true_one():
+    path = np.zeros((1, 20, 2))
+    drawn, truth = plots.fan({"solved": path}, truth=path[0]).axes[0].lines
+    assert drawn.get_zorder() > truth.get_zorder() and drawn.get_alpha() is None
+
+
 def test_shares_fill_the_whole_and_contacts_lie_below():
     left = np.array([0.2, 0.7, 1.0])
     (axes,) = plots.shares(

@@ -286,8 +286,9 @@ def fan(paths: Mapping[str, Sequence], truth: Sequence | None = None) -> Figure:
     )
     for index, (axes, (name, many)) in enumerate(zip(panels[0], paths.items(), strict=True)):
         color = palette.color(name, index)
+        look = dict(lw=0.8, alpha=0.5) if len(many) > 1 else dict(lw=1.2, zorder=3)  # over `truth`
         for path in np.asarray(many):
-            axes.plot(*path.T, color=color, lw=0.8, alpha=0.5)
+            axes.plot(*path.T, color=color, **look)
         if truth is not None:
             axes.plot(*np.asarray(truth).T, color=INK, lw=2, ls="--")
         axes.set_title(name, fontsize=10)
