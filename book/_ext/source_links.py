@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping
 
 from sphinx.application import Sphinx
+from sphinx.domains.python import ObjectEntry
 
 BACK = re.compile(r'(<a class="viewcode-back" href="[^"#]*?)([\w/]+)(\.html#)([\w.]+)"')
 
@@ -30,11 +31,19 @@ def rewrite(body: str, pages: Mapping[str, str]) -> str:
     return BACK.sub(led, body)
 
 
+def explained(objects: Mapping[str, ObjectEntry]) -> dict[str, str]:
+    """Names that have a place in the reference, and their pages: no modules, no second names."""
+    return {
+        name: its.docname
+        for name, its in objects.items()
+        if its.objtype != "module" and not its.aliased
+    }
+
+
 def setup(app: Sphinx) -> dict:
     def process(app, pagename, templatename, context, doctree):
         if pagename.startswith("_modules/") and "body" in context:
-            named = app.env.get_domain("py").objects.items()
-            pages = {name: its.docname for name, its in named if its.objtype != "module"}
+            pages = explained(app.env.get_domain("py").objects)
             context["body"] = rewrite(context["body"], pages)
 
     app.connect("html-page-context", process)

@@ -37,3 +37,16 @@ def test_a_link_leads_to_the_name_that_the_reference_has(rewrite, page, written,
 def test_other_links_stay(rewrite):
     other = '<a href="book/api/solvers_path.html#motionlab.finished">finished</a>'
     assert rewrite(other) == other
+
+
+def test_second_names_and_modules_have_no_place_in_the_reference(extension):
+    from sphinx.domains.python import ObjectEntry
+
+    objects = {
+        "motionlab.solvers.design.finished": ObjectEntry("api", "x", "function", False),
+        "motionlab.finished": ObjectEntry("api", "x", "function", True),
+        "motionlab.solvers": ObjectEntry("api", "y", "module", False),
+    }
+    assert extension("source_links").explained(objects) == {
+        "motionlab.solvers.design.finished": "api"
+    }
