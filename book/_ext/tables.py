@@ -3,6 +3,7 @@
 * A table of more than twenty rows folds, under a line that says how many they are.
 * Counts such as updates, which pandas writes as 500000.0 where a number is missing beside them, are
   written as 500000, and so is 5e+05; -0.0 is 0.0; what is missing is a dash, not NaN; True is yes.
+* Heads that pandas sets in two rows, one of them all but empty, stand in one.
 * A row whose name begins with ▸ is one that matters, and stands out.
 """
 
@@ -33,6 +34,7 @@ def _table(table: str) -> str:
         cell.string = f"{float(cell.text):.0f}"
     for cell in soup.find_all("td", string=NOTHING.fullmatch):
         cell.string = cell.text[1:]
+    _join_heads(soup)
     for cells, heads in _lines(soup, rows):
         _count(cells, measured=any(map(UNIT.search, heads)))
     for cell in soup.find_all("td", string=re.compile("^(True|False)$")):
@@ -44,6 +46,18 @@ def _table(table: str) -> str:
     if len(rows) <= ROWS:
         return str(soup)
     return f'<details class="long"><summary>A table of {len(rows)} rows</summary>{soup}</details>'
+
+
+def _join_heads(soup: BeautifulSoup) -> None:
+    """Names of the columns at the left stand in a row of their own: put them into the row above."""
+    lines = soup.select("thead tr")
+    if len(lines) == 2:
+        above, below = (line.find_all("th") for line in lines)
+        names = [th for th in below if th.text.strip()]
+        if below[: len(names)] == names and not any(th.text.strip() for th in above[: len(names)]):
+            for empty, name in zip(above, names, strict=False):
+                empty.string = name.text
+            lines[1].decompose()
 
 
 def _lines(soup: BeautifulSoup, rows: list) -> list[tuple[list, list[str]]]:

@@ -46,6 +46,14 @@ def test_counts_are_found_below_heads_of_two_levels(rewrite):
     assert "<td>2.0</td>" in page and "<td>4.0</td>" in page
 
 
+def test_the_name_of_rows_stands_in_the_one_row_of_heads(rewrite):
+    table = pd.DataFrame({"clips": [3, 4]}, index=pd.Index(["cmu", "accad"], name="source"))
+    page = rewrite(table.to_html())
+    assert page.count("<tr") == 3 and "<th>source</th>" in page and "<th>clips</th>" in page
+    two = table.set_index(pd.Index(["a", "b"], name="style"), append=True)
+    assert rewrite(two.to_html()).count("<tr") == 3
+
+
 def test_what_holds_is_yes(rewrite):
     page = rewrite(pd.DataFrame({"helps": [True, False]}).to_html())
     assert "<td>yes</td>" in page and "<td>no</td>" in page and "True" not in page

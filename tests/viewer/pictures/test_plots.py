@@ -151,7 +151,7 @@ def test_a_mark_for_every_value_and_equal_keys_in_the_legend():
     first, second = axes.collections
     assert first.get_offsets().tolist() == [[1, 3], [2, 4]]
     assert first.get_sizes()[1] > second.get_sizes()[0] > first.get_sizes()[0]
-    keys = [handle.get_sizes()[0] for handle in axes.get_legend().legend_handles]
+    keys = [handle.get_sizes()[0] for handle in axes.figure.legends[0].legend_handles]
     assert keys[0] == keys[1]
 
 

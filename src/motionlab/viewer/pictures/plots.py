@@ -171,7 +171,9 @@ def scatter(
         look = dict(facecolor=to_rgba(color, 0.45), edgecolor=color, lw=1.3, marker=shape)
         axes.scatter(xs, ys, s=areas, label=name, **look)
     axes.set(xlabel=x, ylabel=y)
-    legend = axes.legend()
+    legend = figure.legend(
+        loc="outside upper center", ncols=3
+    )  # beside no mark that looks like its own
     for handle in legend.legend_handles:
         handle.set_sizes([60])  # not that of the first mark
     return figure
