@@ -55,6 +55,8 @@ CONVENTIONS = {
     "low, with a prefix": "mixamorighips mixamorigspine mixamorigspine2 mixamorigneck mixamorighead "
     "mixamorig@shoulder mixamorig@arm mixamorig@forearm mixamorig@hand mixamorig@upleg "
     "mixamorig@leg mixamorig@foot mixamorig@toebase left right",
+    "low, with a suffix": "hipsjnt spinejnt spine2jnt neckjnt headjnt @shoulderjnt @upperarmjnt "
+    "@lowerarmjnt @handjnt @upperlegjnt @lowerlegjnt @footjnt @toesjnt left right",
     "maya, nested": "a:b:Hips a:b:Spine a:b:Spine1 a:b:Neck a:b:Head a:b:@Shoulder a:b:@Arm "
     "a:b:@ForeArm a:b:@Hand a:b:@UpLeg a:b:@Leg a:b:@Foot a:b:@ToeBase Left Right",
     "mixamo": "mixamorig1:Hips mixamorig1:Spine mixamorig1:Spine2 mixamorig1:Neck mixamorig1:Head "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import pytest
@@ -358,17 +359,18 @@ def conventions(draw) -> list[str]:
     return made
 
 
-def test_most_of_them_are_understood():
-    """So that the test below does not pass because nothing is understood."""
+def test_nearly_all_of_them_are_understood_and_none_wrongly():
     understood = []
 
-    @settings(max_examples=200, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=500, deadline=None, derandomize=True, database=None)
     @given(conventions())
     def count(names):
-        understood.append(replace(CANONICAL, names=names).roles == CANONICAL.roles)
+        found = replace(CANONICAL, names=names).roles
+        assert found.items() <= CANONICAL.roles.items()
+        understood.append(len(found) == len(CANONICAL.roles))
 
     count()
-    assert sum(understood) > 0.8 * len(understood)
+    assert sum(understood) > 0.95 * len(understood)
 
 
 @pytest.fixture(scope="module")
@@ -381,7 +383,9 @@ def wanted(gait) -> Motion:
 def test_right_or_refused_and_never_mirrored_wrongly(gait, wanted, names):
     motion = rig_names.renamed(gait, names)
     try:
-        found = motion.retarget()
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".*by the lengths of bones", UserWarning)
+            found = motion.retarget()
         assert (found.positions() - wanted.positions()).norm(dim=-1).max() < 0.02
     except RetargetError as error:
         assert "roles=" in str(error)

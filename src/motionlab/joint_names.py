@@ -21,7 +21,7 @@ LEG = ("upper_leg", "lower_leg", "foot", "toes")
 # what its joints say is largest; words that leave a choice must be weaker than those that do not.
 CLEAR = 35
 NEARLY_ALL = 0.6  # share of the joints, of a rig's word such as a prefix
-_GLUED = 4  # letters in front of nearly all names, which a helper's need not have
+_GLUED = 4  # letters at an end of nearly all names, which a helper's need not have
 _MANY = 10  # joints that share the letters in front of them by no chance
 _LONGEST = 30  # letters of what may be glued to a side's
 _PAIRED = {
@@ -66,6 +66,9 @@ _JAPANESE = dict(
 _SILENT = frozenset(
     "joint jnt jt bone bn bind skin def org bip biped bend stretch center centre mid b c j m x".split()
 )
+# Glued to names, backwards: of "leftjnt" and "rightjnt" the t is not the rig's, and of "spine2jnt"
+# the digit has parted the end already.
+_SILENT_ENDS = frozenset(word[::-1] for word in _SILENT if len(word) > 2)
 # Words of a body that have a side and no role, and what may stand before and after them.
 _OTHERS = "thumb index middle ring pinky finger fingers eye ear brow breast heel buttock palm"
 _BESIDE = "up upper lo low lower fore twist roll end tip base joint ik"
@@ -118,7 +121,7 @@ def readings(names: tuple[str, ...]) -> tuple[tuple[str | None, str, tuple[str, 
 def _unglued(letters: list[list[str]]) -> list[list[str]]:
     """Names without the letters that nearly all begin or end with, as in "mixamorighips"."""
     whole = ["".join(words) for words in letters]
-    start, end = _shared(whole), _shared([word[::-1] for word in whole])[::-1]
+    start, end = _shared(whole), _shared([word[::-1] for word in whole], _SILENT_ENDS)[::-1]
     of_a_body = any(part in _WHOLE or _side([part])[0] for part in (start, end))
     if len(whole) < _MANY or of_a_body:
         return letters
@@ -133,11 +136,14 @@ def _unglued(letters: list[list[str]]) -> list[list[str]]:
     return cut
 
 
-def _shared(words: list[str]) -> str:
-    """What all words begin with, or, if it is `_GLUED` letters at least, nearly all."""
+def _shared(words: list[str], known: frozenset[str] = frozenset()) -> str:
+    """What all words begin with, or nearly all: a word that is known, or else `_GLUED` letters at least."""
     ordered, most = sorted(words), math.ceil(NEARLY_ALL * len(words))
     windows = zip(ordered, ordered[most - 1 :], strict=False)
     often = max((commonprefix(pair) for pair in windows), key=len, default="")
+    for end in range(len(often), 0, -1):
+        if often[:end] in known:
+            return often[:end]
     return often if len(often) >= _GLUED else commonprefix(ordered)
 
 
