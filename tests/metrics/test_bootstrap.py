@@ -57,6 +57,7 @@ def test_times_that_never_come():
 
 def test_intervals_are_read_without_exponents():
     assert str(Interval(1234.5, 0.0004, float("inf"), 3)) == "1234 [0, inf]"
+    assert str(Interval(2.0, 2.0, 2.0, 1)) == "2 (one clip)"  # whose interval would be no width
 
 
 def test_jackknife_of_a_mean_is_students_interval():

@@ -61,5 +61,5 @@ def test_another_statistic():
         {"a": {"time": [1.0, 2.0, np.inf]}}, floor={"real": {"time": [np.inf]}}, statistic=np.median
     )
     assert (
-        found.loc["a", "time"].startswith("2 [") and found.loc["real", "time"] == "inf [inf, inf]"
+        found.loc["a", "time"].startswith("2 [") and found.loc["real", "time"] == "inf (one clip)"
     )

@@ -31,7 +31,7 @@ class Interval(NamedTuple):
             f"{round(x, 3):.3g}" if abs(x) < 1000 else f"{x:.0f}"
             for x in (self.value, self.low, self.high)
         )
-        return f"{value} [{low}, {high}]"
+        return f"{value} (one clip)" if self.clips == 1 else f"{value} [{low}, {high}]"
 
 
 def bootstrap(
