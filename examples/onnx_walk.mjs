@@ -183,7 +183,7 @@ async function main(args) {
   for await (const pose of poses(about, rows)) if (made.push(pose) >= count) break;
   writeFileSync(out, bvh(about, made));
   const [x, , z] = made.at(-1).place;
-  console.log(`${out}: ${made.length} frames from '${start.name}'; it ends ${x.toFixed(1)} m left, ${z.toFixed(1)} m ahead`);
+  console.log(`${out}: ${made.length} frames from '${start.name}'; it ends ${z.toFixed(1)} m ahead, ${Math.abs(x).toFixed(1)} m to the ${x > 0 ? 'left' : 'right'}`);
 }
 
 if (globalThis.process?.argv[1]?.endsWith("onnx_walk.mjs")) await main(process.argv.slice(2)).catch(({ message }) => { console.error(message); process.exitCode = 1; });

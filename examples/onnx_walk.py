@@ -156,5 +156,6 @@ if __name__ == "__main__":
         file.write(bvh(about, made))
     x, _, z = made[-1][0]
     print(
-        f"{asked.out}: {len(made)} frames from {start['name']!r}; it ends {x:.1f} m left, {z:.1f} m ahead"
+        f"{asked.out}: {len(made)} frames from {start['name']!r}; it ends {z:.1f} m ahead, "
+        f"{abs(x):.1f} m to the {'left' if x > 0 else 'right'}"
     )
